@@ -101,7 +101,7 @@ def written_title(text: str) -> str:
 
 
 # Those that are not the same in every language.
-UNITS = (N_("deg"), N_("deg (mm of a prismatic joint)"), N_("deg/s"), N_("µdeg/s"))
+UNITS = (N_("deg (mm of a prismatic joint)"),)
 
 
 def use(language: str, own: Mapping[str, str] | None = None) -> None:
@@ -259,10 +259,20 @@ def with_unit(value: str, unit: str, gap: str = " ") -> str:
     ----------
     value : as text
     unit : in English; empty for none
-    gap : between both; Chinese has none before °
+    gap : between both; there is none before °
     """
-    shown = tr(unit)
+    shown = unit_sign(unit)
     return value + ("" if shown.startswith("°") else gap) + shown if shown else value
+
+
+def unit_sign(unit: str) -> str:
+    """A unit as pages and the command line print it: deg as °.
+
+    Parameters
+    ----------
+    unit : as results name it
+    """
+    return tr(unit).replace("deg", "°")
 
 
 def own_title(text: str) -> str:

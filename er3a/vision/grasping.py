@@ -251,6 +251,8 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
             pair=task.bodies.pairs[pair[best]],
             clearance_mm=float(1000 * distance[best]),
             needed_mm=1000 * needs.clearance,
+            q=tuple(q[regular[best]].tolist()),  # rad or m
+            near_m=tuple(task.bodies.surface_points(q[regular[best]], int(pair[best])).mean(axis=0).tolist()),
         )
     regular, margins = regular[free], np.minimum(margins, _ratio(distance, needs.clearance))[free]
     far = np.abs(q[regular] - task.home).max(axis=1)

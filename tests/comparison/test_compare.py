@@ -359,7 +359,7 @@ def test_limits_on_sums_of_joints_are_not_compared_and_follow_corrected_zeros_an
 def test_what_is_aligned_exactly_is_0_mm_off_in_words():
     right = er3a.load_robot("er3a_c60")
     turned = right.replace(offset=right.offset + np.radians([0, 0, 90, 0, 0, 0]))
-    assert headline(er3a.compare(turned, right)).endswith("aligned by 0 mm and 0 deg)")
+    assert headline(er3a.compare(turned, right)).endswith("aligned by 0 mm and 0°)")
 
 
 def test_a_flange_that_is_only_turned_is_named_with_its_angle():
@@ -368,7 +368,7 @@ def test_a_flange_that_is_only_turned_is_named_with_its_angle():
     found = er3a.compare(right.replace(offset=right.offset + np.radians([0, 0, 0, 0, 0, 180])), right)
     assert (round(found.as_printed_mm, 6), round(found.as_printed_deg, 6)) == (0, 180)
     assert found.aligned_deg < 1e-6
-    assert "by 0.0 mm and 180.00 deg at the worst found" in headline(found)
+    assert "by 0.0 mm and 180.00° at the worst found" in headline(found)
 
 
 def test_tools_that_differ_are_said_not_to_be_compared(tmp_path):
@@ -401,7 +401,7 @@ def test_what_is_not_compared_is_named_beside_equal():
     speed[3] = np.nan
     bare = arm.replace(envelopes=(), hulls=(), pair_rules=(), masses=Masses())
     equal = headline(er3a.compare(arm, bare))
-    assert "0.0 mm and 0.00 deg" in equal
+    assert "0.0 mm and 0.00°" in equal
     assert "not compared" not in equal
     arm = bare
     found = er3a.compare(arm, arm.replace(speed=speed))
@@ -415,7 +415,7 @@ def test_beside_equal_stands_how_far_the_flange_is_off_within_the_tolerances():
     found = er3a.compare(arm, arm.replace(a=arm.a + 0.0004, alpha=arm.alpha + np.radians(0.08)))
     assert found.verdict == "equal"
     assert found.as_printed_mm > 1 > found.geometry.worst_mm
-    assert f"{found.as_printed_mm:.1f} mm and {found.as_printed_deg:.2f} deg" in headline(found)
+    assert f"{found.as_printed_mm:.1f} mm and {found.as_printed_deg:.2f}°" in headline(found)
 
 
 def test_what_both_arms_give_and_no_layer_compares_is_named_and_only_that():
@@ -424,7 +424,7 @@ def test_what_both_arms_give_and_no_layer_compares_is_named_and_only_that():
     heavier = weighed.replace(masses=Masses((LinkMass(1, MassBody(9.0)),), weight=90.0))
     found = er3a.compare(weighed, heavier)
     assert found.not_examined == ("speeds", "tool", "envelopes", "inertia", "weight")
-    assert headline(found).endswith("deg); not compared: speeds, tool, shapes of links, masses, weight")
+    assert headline(found).endswith("°); not compared: speeds, tool, shapes of links, masses, weight")
     assert layer_rows(found)[-4:] == [
         (name, "not compared", "") for name in ("tool", "shapes of links", "masses", "weight")
     ]

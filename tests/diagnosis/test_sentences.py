@@ -22,15 +22,15 @@ from er3a.pipeline.messages.say import MAKERS, say
 @pytest.mark.parametrize(
     ("found", "shown"),
     [
-        (fact("wrong_offset", joint=2, given_deg=0.0, fits_deg=-90.0), ("offset 2", "0 deg", "−90 deg")),
-        (fact("wrong_offset", joint=4, given_deg=45.0, fits_deg=-2.9e-5), ("offset 4", "45 deg", " 0 deg")),
-        (fact("wrong_alpha", joint=3, given_deg=-70.0, fits_deg=-89.99997), ("alpha 3", "−70 deg", "−90 deg")),
+        (fact("wrong_offset", joint=2, given_deg=0.0, fits_deg=-90.0), ("offset 2", "0°", "−90°")),
+        (fact("wrong_offset", joint=4, given_deg=45.0, fits_deg=-2.9e-5), ("offset 4", "45°", " 0°")),
+        (fact("wrong_alpha", joint=3, given_deg=-70.0, fits_deg=-89.99997), ("alpha 3", "−70°", "−90°")),
         (fact("wrong_length", joint=6, column="d", given_mm=0.0, fits_mm=78.50004), ("d6", " 0 mm", "78.5 mm")),
         (fact("wrong_length", joint=1, column="d", given_mm=367.5, fits_mm=367.4371), ("d1", "367.5 mm", "367.4 mm")),
         (fact("wrong_length", joint=2, column="d", given_mm=10.0, fits_mm=1e-12), ("d2", "10 mm", " 0 mm")),
         (
             fact("wrong_limit", joint=13, side="lower", given_deg=-75.0, fits_deg=-65.0),
-            ("J13 lower", "−75 deg", "−65 deg"),
+            ("J13 lower", "−75°", "−65°"),
         ),
         (fact("wrong_scale", factor=1 / 1.05), ("0.952381",)),
         (
@@ -46,7 +46,7 @@ from er3a.pipeline.messages.say import MAKERS, say
                 unit="mm",
                 alternatives=((fact("reversed_direction", joint=5),),),
             ),
-            ("one of 2", "180 deg", "J5", "136 mm", "0.0 mm"),
+            ("one of 2", "180°", "J5", "136 mm", "0.0 mm"),
         ),
         (fact("no_fault_stands_out", missed=1, references=45, half_widths=2.5, tried=9000), ("1 of 45", "2.5", "9000")),
     ],

@@ -153,9 +153,7 @@ def test_rows_outside_use_the_turn_nearest_to_the_range():
     assert (first.joint, first.side, fourth.joint, fourth.side) == (1, "above", 4, "below")
     assert tuple(size.value for size in (first.value, first.excess, first.limit)) == pytest.approx((170, 160, 10))
     assert tuple(size.value for size in (fourth.value, fourth.excess, fourth.limit)) == pytest.approx((182, 18, 200))
-    assert say(exceeded) == (
-        "J1 at 170.0 deg: 160 deg beyond its limit of 10 deg; J4 at 182.0 deg: 18 deg beyond its limit of 200 deg"
-    )
+    assert say(exceeded) == ("J1 at 170.0°: 160° beyond its limit of 10°; J4 at 182.0°: 18° beyond its limit of 200°")
     assert limits_exceeded(arm, np.append(np.zeros(3), [205 * DEG, 0, 0])) is None
     below = nearest_equivalent(arm, np.array([0, 0, 0, 215 - 360, 0, 0]) * DEG, np.zeros(6)) / DEG
     assert below[3] == pytest.approx(215)

@@ -158,7 +158,7 @@ def test_why_it_fails(robot, random):
     narrow = robot.replace(lower=np.full(6, -0.05), upper=np.full(6, 0.05))
     (unsolved,) = solve(narrow, forward(robot, np.full(6, 0.2)), restarts=20).unsolved
     assert unsolved.why.code == "limit_bound"
-    assert "beyond its limit of 2.86479 deg" in say(unsolved)
+    assert "beyond its limit of 2.86479°" in say(unsolved)
 
 
 def test_nearest_arm_of_an_unreachable_pose_is_near(robot):

@@ -50,7 +50,7 @@ def test_what_was_checked_is_said_once_and_findings_are_lines_as_compilers_print
     assert scope.startswith(f"{FAULTS}/outside_limits.src: 1 of 2 motions pass limits, reach, configuration, ")
     assert scope.endswith("; 1 fail (lines 9); not checked: scene (none given: --scene)")
     (found,) = findings
-    assert found.startswith(f"{FAULTS}/outside_limits.src:9: error: J3 reaches 140.0 deg; upper limit 105 deg")
+    assert found.startswith(f"{FAULTS}/outside_limits.src:9: error: J3 reaches 140.0°; upper limit 105°")
     assert found.endswith("[above_limit]")
 
 

@@ -48,7 +48,7 @@ def test_nearest_of_none_and_of_one():
     assert choice.reason == fact(
         "only_admissible", move=fact("greatest_move", joint=1, move=Amount(np.degrees(1), "deg"))
     )
-    assert say(choice.reason) == "greatest joint move 57.3 deg (J1); the only admissible solution"
+    assert say(choice.reason) == "greatest joint move 57.3° (J1); the only admissible solution"
 
 
 def test_nearest_counts_turns_from_the_reference(robot):
@@ -81,9 +81,9 @@ def test_a_millimetre_of_a_slide_counts_as_a_degree_and_is_told_as_one():
     assert choice.reason.move == fact("greatest_move", joint=3, move=Amount(pytest.approx(120), "mm"))
     assert say(choice.reason).startswith("greatest joint move 120.0 mm (J3); the next best")
     assert "needs as much, but" in say(choice.reason)
-    assert "deg (mm of a prismatic joint)" in say(choice.reason)
+    assert "° (mm of a prismatic joint)" in say(choice.reason)
     ranking = select(robot, solutions, {"nearest": 1, "limits": 1}, q_ref)
     np.testing.assert_allclose(ranking.measured["nearest"], 120)
     np.testing.assert_allclose(ranking.measured["limits"], 30)
-    assert "limits 30 deg (mm of a prismatic joint)" in say(ranking.chosen_reason)
+    assert "limits 30° (mm of a prismatic joint)" in say(ranking.chosen_reason)
     assert "q3_mm" in repr(select_sequence(robot, [solutions], q_ref))

@@ -71,7 +71,7 @@ def test_a_target_moved_or_turned_as_advised_is_reached_with_margin(refused):
         texts = {advice.code: say(advice).replace("−", "-") for advice in before.advice}
         poses = []
         if "turn_tool" in texts:
-            rpy = re.search(f"yaw = {NUMBERS} deg", texts["turn_tool"]).groups()
+            rpy = re.search(f"yaw = {NUMBERS}°", texts["turn_tool"]).groups()
             poses.append(transform(T[:3, 3], np.radians(np.array(rpy, float))))
         if "shift_tool" in texts:
             xyz = re.search(rf"\({NUMBERS}\)", texts["shift_tool"]).groups()

@@ -165,7 +165,7 @@ def test_a_line_past_a_singular_pose_is_told_by_it_then_by_what_weighs_most_then
     assert fault.cause.endswith(": J4 and J6 in line")
     limit, rates = fault.moments
     assert limit.what.startswith("J4 reaches ")
-    assert rates.what == "too fast: J4, J6; J4 needs 3800 deg/s; limit 360 deg/s (assumed)"
+    assert rates.what == "too fast: J4, J6; J4 needs 3800°/s; limit 360°/s (assumed)"
     assert f"t={round(found['above_limit'].program_s, 9)}#singular_line" in fault.address
     report(study, stored["er3a_c60"], tmp_path / "programs.html")
     html = (tmp_path / "programs.html").read_text(encoding="utf-8")

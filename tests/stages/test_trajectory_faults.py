@@ -444,8 +444,8 @@ def test_a_fault_of_rates_tells_all_its_joints_until_the_last_of_what_adjoins_is
         stretch(rate_fault(2, 4, 6600.0, 1440.0, assumed=True), 2.005, 2.158, 2.043),
     ]
     assert _rates(parts) == (
-        "until t = 2.158 s too fast: J4, J6; J4 needs 762 deg/s; limit 360 deg/s (assumed) at t = 2 s; "
-        "J6 needs 6624 deg/s²; limit 1440 deg/s² (assumed) at t = 1.957 s"
+        "until t = 2.158 s too fast: J4, J6; J4 needs 762°/s; limit 360°/s (assumed) at t = 2 s; "
+        "J6 needs 6624°/s²; limit 1440°/s² (assumed) at t = 1.957 s"
     )
     again = stretch(rate_fault(1, 1, 200.0, 180.0, assumed=True), 3.0, 3.1, 3.05)
     assert _rates([again, *parts]).endswith("; again from t = 3 s")
@@ -454,12 +454,12 @@ def test_a_fault_of_rates_tells_all_its_joints_until_the_last_of_what_adjoins_is
 
 def test_a_rate_far_beyond_its_limit_is_told_to_two_digits_and_none_where_it_has_no_bound():
     """Near a singular pose its digits depend on where it was sampled; towards the edge of the reach it has no bound."""
-    assert say(rate_fault(1, 4, 3600.0, 360.0)) == "J4 needs 3600 deg/s; limit 360 deg/s"
-    assert say(rate_fault(1, 4, 3786.6, 360.0, assumed=True)) == "J4 needs 3800 deg/s; limit 360 deg/s (assumed)"
-    assert say(rate_fault(1, 4, 380330.0, 360.0)) == "J4 needs over 300 times as much; limit 360 deg/s"
+    assert say(rate_fault(1, 4, 3600.0, 360.0)) == "J4 needs 3600°/s; limit 360°/s"
+    assert say(rate_fault(1, 4, 3786.6, 360.0, assumed=True)) == "J4 needs 3800°/s; limit 360°/s (assumed)"
+    assert say(rate_fault(1, 4, 380330.0, 360.0)) == "J4 needs over 300 times as much; limit 360°/s"
     assert "over 300 times" in say(rate_fault(2, 4, np.inf, 1440.0))
     (part,) = [stretch(rate_fault(2, 4, 16748.0, 1440.0, assumed=True), 1.0, 1.1, 1.05)]
-    assert "J4 needs 17\u202f000 deg/s²; limit 1440 deg/s² (assumed) at t = 1.05 s" in _rates([part])
+    assert "J4 needs 17\u202f000°/s²; limit 1440°/s² (assumed) at t = 1.05 s" in _rates([part])
     assert times_needed(112.0) == "110 × its limit"
 
 
@@ -477,7 +477,7 @@ def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_
     assert told[1].text.endswith("without bound towards the edge of the reach")
     assert cause_of(out).startswith("the edge of the reach: ")
     (event,) = near.singularities
-    assert cause_of(near) == f"wrist singularity within 1.88 deg at t = {event.t_s:.4g} s: J4 and J6 in line"
+    assert cause_of(near) == f"wrist singularity within 1.88° at t = {event.t_s:.4g} s: J4 and J6 in line"
     assert cause_of(replace(near, singularities=())) == ""
     assert cause_of(replace(near, singularities=(replace(event, t_s=0.5, until_s=0.5),))) == ""
     fault = {each.name: each for each in faults(results)}["line_wrist_near"]
@@ -543,6 +543,6 @@ def test_the_player_marks_what_fails_and_says_so_of_paths_near_assumed_shapes_to
 
 def test_a_motion_on_another_solution_says_how_far_its_start_is_and_that_the_way_was_not_checked():
     assert switch_text([0.1, 0, 0, 179.6, -93.2, 100.0], (6,)) == (
-        "It begins at other joint angles (J4 +180 deg, J5 −93 deg, J6 +100 mm): the way there was not checked"
+        "It begins at other joint angles (J4 +180°, J5 −93°, J6 +100 mm): the way there was not checked"
     )
     assert switch_text([0.0] * 6, ()) == "The move to the other solution is part of it and was checked"

@@ -405,7 +405,7 @@ def test_the_article_is_another_robot_and_contradicts_itself_in_two_statements(s
     text = say(summaries["er3a_c60_article"].verdict.finding)
     first, second = text.index("This is not the robot that these describe"), text.index("contradicts its own text")
     assert "361.1 mm" in text[first:second]
-    assert "−90 deg" not in text[first:second]
+    assert "−90°" not in text[first:second]
     assert "The text is no evidence about a real robot" in text[second:]
     assert "Most likely fault" not in text
     page = page_of(study, stored["er3a_c60_article"], tmp_path)
@@ -574,7 +574,7 @@ def test_a_named_fault_is_in_the_verdict_and_on_the_page(study, tmp_path):
     found = stored.results.summary.verdict.finding
     assert is_one(found, "validation.defined_otherwise")
     assert found.diagnosis.faults == (MISSING_OFFSET,)
-    assert "offset 2 is 0 deg, −90 deg fits" in say(found)
+    assert "offset 2 is 0°, −90° fits" in say(found)
     page = page_of(wrong, stored, tmp_path)
     assert 'id="corrected"' in page
     assert page.index("<h2>Diagnosis") < page.index("<h2>Checks")

@@ -102,7 +102,7 @@ def test_a_verdict_says_which_limit_makes_the_void():
     assert verdict.finding.cause == fact(
         "void_disappears", limits=(relaxed_limit((3,), (1.0,), "upper", "deg", 75.0, (15.0, 1.0)),)
     )
-    assert "J3 ≤ 75 deg; it disappears at J3 ≤ 90 deg" in say(verdict.finding)
+    assert "J3 ≤ 75°; it disappears at J3 ≤ 90°" in say(verdict.finding)
 
 
 # --- reach ---

@@ -65,7 +65,7 @@ def test_what_nothing_confirms_is_named_entry_by_entry_or_as_a_whole():
     names = "alpha 6, offset 6, direction 1, 2, 3, 4, 5, 6, all limits"
     assert unconfirmed(FOUND.parts, FOUND.unbounded) == names
     assert settled_parts(FOUND).endswith(f"Not confirmed: {names}.")
-    for counted in ("5 mm and 0.5 deg", "16 of 17 lengths and twists (10 of", "5 of 12 zeros and directions (5 of"):
+    for counted in ("5 mm and 0.5°", "16 of 17 lengths and twists (10 of", "5 of 12 zeros and directions (5 of"):
         assert counted in settled_parts(FOUND)
     assert names in condition(FOUND.parts, FOUND.unbounded)
     nothing = tuple(part.but(settled=0, up_to_signs=0) for part in FOUND.parts)

@@ -62,8 +62,8 @@ def test_recording_is_sound(small_study, stage):
 @pytest.mark.parametrize(
     ("arm", "titles"),
     [
-        (lambda: load_robot(ROBOT), ("Joint velocity (deg/s)", "Joint angle (deg)")),
-        (scara, ("Velocity (deg/s, J3: mm/s)", "Angle (deg, J3: mm)")),
+        (lambda: load_robot(ROBOT), ("Joint velocity (°/s)", "Joint angle (°)")),
+        (scara, ("Velocity (°/s, J3: mm/s)", "Angle (°, J3: mm)")),
         (gantry, ("Joint velocity (mm/s)", "Joint position (mm)")),
     ],
 )

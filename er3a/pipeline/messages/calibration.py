@@ -74,7 +74,7 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         *(
             []
             if found.turned_before_deg is None
-            else [f"orientations: {found.turned_before_deg:.4g} deg before, {found.turned_after_deg:.4g} deg after"]
+            else [f"orientations: {found.turned_before_deg:.4g}° before, {found.turned_after_deg:.4g}° after"]
         ),
         *_entry_lines(found.estimates),
         *(f"not estimated: {say(reason)}" for reason in found.held),

@@ -73,8 +73,8 @@ def headline(found: Comparison, doubts: Iterable[str] = ()) -> str:
         a, b = found.joints
         return tr("{verdict}: {a} and {b}", verdict=text, a=a, b=b) if found.verdict == "other_joint_count" else text
     off = tr(
-        "{verdict} (flange off by {printed:.1f} mm and {turned:.2f} deg at the worst found; aligned by "
-        "{aligned:.4g} mm and {aligned_deg:.3g} deg)",
+        "{verdict} (flange off by {printed:.1f} mm and {turned:.2f}° at the worst found; aligned by "
+        "{aligned:.4g} mm and {aligned_deg:.3g}°)",
         verdict=text,
         printed=found.as_printed_mm,
         turned=found.as_printed_deg,
@@ -128,7 +128,7 @@ def _detail(name: str, found: Comparison) -> str:
 def _(found: GeometryLayer) -> str:
     if found.same:
         return tr(
-            "{count} of {count} invariants, worst {mm:.2g} mm, {deg:.2g} deg",
+            "{count} of {count} invariants, worst {mm:.2g} mm, {deg:.2g}°",
             count=found.invariants,
             mm=found.worst_mm,
             deg=found.worst_deg,
@@ -140,7 +140,7 @@ def _(found: GeometryLayer) -> str:
 def _(found: Difference) -> str:
     if isinstance(found.a, str) or isinstance(found.b, str):
         return f"{found.entry} {found.a} → {found.b}"
-    shown = f"{found.entry} {found.a:.6g} → {found.b:.6g} {found.unit}"
+    shown = with_unit(f"{found.entry} {found.a:.6g} → {found.b:.6g}", found.unit)
     if not found.alike:
         return shown
     return tr("{shown} (or {others}: a sum alone is known)", shown=shown, others=", ".join(found.alike))
@@ -166,7 +166,7 @@ def _(found: PlacementLayer) -> str:
         parts.append(tr("shifted by ({x:.6g}, {y:.6g}, {z:.6g}) mm", x=x, y=y, z=z))
     if found.turn.deg > 1e-3:
         axis = _axis(found.turn.axis)
-        parts.append(tr("turned {deg:.6g} deg about {axis}", deg=found.turn.deg, axis=axis))
+        parts.append(tr("turned {deg:.6g}° about {axis}", deg=found.turn.deg, axis=axis))
     moved = joined(parts, ", ")
     if not found.entries:
         return moved
@@ -188,4 +188,4 @@ def _(found: RangeLayer) -> str:
 @say.register
 def _(found: RangeDifference) -> str:
     a, b = (tr("none") if value is None else f"{value:.6g}" for value in (found.a, found.b))
-    return f"J{found.joint} {found.entry} {a} → {b} {found.unit}"
+    return with_unit(f"J{found.joint} {found.entry} {a} → {b}", found.unit)

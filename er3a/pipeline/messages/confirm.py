@@ -11,7 +11,7 @@ from er3a.confirmation.plan import Plan
 from er3a.finding import Finding, plain
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.language import as_text
+from er3a.pipeline.language import as_text, with_unit
 from er3a.pipeline.messages.numbers import number
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -57,7 +57,7 @@ JOINTS = {
     "turns_other_way": "J{joint} turns the other way at the controller; direction of row {joint} changes its sign",
     "counted_from": "J{joint} of the pendant is counted with J{by}; coupling: rows: {rows}",
     "columns_swapped": "the columns of J{first} and J{second} are swapped",
-    "zero_elsewhere": "zero of J{joint} is {deg} deg elsewhere; add this to offset_deg of row {joint}",
+    "zero_elsewhere": "zero of J{joint} is {deg}° elsewhere; add this to offset_deg of row {joint}",
 }
 NOTHING = "the model as it is"
 ACCURACY = (
@@ -100,7 +100,7 @@ def lines_of(found: Confirmation, *, nearest: str = "", every: bool = False) -> 
 
 
 def _off(found: Confirmation, mm: float, deg: float) -> str:
-    return f"{number(mm, 3)} mm" + (f" and {number(deg, 3)} deg" if found.oriented else "")
+    return f"{number(mm, 3)} mm" + (f" and {number(deg, 3)}°" if found.oriented else "")
 
 
 def _found_lines(found: Confirmation, nearest: str) -> Iterator[str]:
@@ -131,7 +131,7 @@ def _found_lines(found: Confirmation, nearest: str) -> Iterator[str]:
         )
     if found.small:
         largest = ", ".join(
-            f"{each.entry.name} {as_text(each.found - each.given, '+.3f')} {each.entry.unit}"
+            with_unit(f"{each.entry.name} {as_text(each.found - each.given, '+.3f')}", each.entry.unit)
             for each in found.small[:SHOWN_ENTRIES]
         )
         yield (
@@ -154,19 +154,19 @@ def _parts(found: Confirmation) -> Iterator[str]:
         width, joint = f"(+-{each.half_width:.2g})", each.entry.joint
         if each.entry.column == "offset":
             yield (
-                f"zero of J{joint} is {as_text(each.found - each.given, '+.3f')} deg off {width}; offset_deg of row "
+                f"zero of J{joint} is {as_text(each.found - each.given, '+.3f')}° off {width}; offset_deg of row "
                 f"{joint}: {given} -> {value}. Zero is defined otherwise, or the joint was mastered wrong: compare its "
                 "marks"
             )
         else:
-            yield f"{each.entry.name}: {given} -> {value} {each.entry.unit} {width}"
+            yield f"{each.entry.name}: {given} -> {with_unit(value, each.entry.unit)} {width}"
 
 
 def _place(place: Placed, turned: bool) -> str:
     xyz, mm = _for_a_file(place.xyz_mm, 2), f"+-{place.half_width_mm:.2g} mm"
     if not turned:
         return f"{{xyz_mm: {xyz}}} ({mm})"
-    return f"{{xyz_mm: {xyz}, rpy_deg: {_for_a_file(place.rpy_deg, 3)}}} ({mm}, {place.half_width_deg:.2g} deg)"
+    return f"{{xyz_mm: {xyz}, rpy_deg: {_for_a_file(place.rpy_deg, 3)}}} ({mm}, {place.half_width_deg:.2g}°)"
 
 
 def _joint(found: Finding) -> str:
@@ -243,12 +243,17 @@ def confirmation_record(found: Confirmation, robot: str, nearest: str = "") -> d
 
 PLAN = (
     "{poses} poses: move there slowly, with the flange as tool and the robot's own base. Write down what the pendant "
-    "shows. Below each pose is what the model says, X Y Z in mm, A B C in deg (Rz Ry Rx)"
+    "shows. Below each pose is what the model says, X Y Z in mm, A B C in ° (Rz Ry Rx)"
 )
 PLAN_SAFE = {
     True: "within limits, clear of arm and base, away from singular poses; cell unknown",
     False: "within limits, above the base, away from singular poses; shapes and cell unknown",
 }
+
+
+def on_pendant(T: Reals) -> tuple[float, ...]:
+    """X, Y, Z (mm) and A, B, C (deg) of a transform (4, 4), m, as a pendant shows them."""
+    return (*(1000 * T[:3, 3]), *np.degrees(rpy_of(T))[::-1])
 
 
 def plan_lines(found: Plan, robot: Robot) -> list[str]:
@@ -257,8 +262,7 @@ def plan_lines(found: Plan, robot: Robot) -> list[str]:
     pose = ("X", "Y", "Z", "A", "B", "C")
     lines = [PLAN.format(poses=len(found.q)), "  ".join(f"{name:>8}" for name in (*names, *pose))]
     for q, T in zip(shown(robot, found.q), found.T):
-        pose_values = (*(1000 * T[:3, 3]), *np.degrees(rpy_of(T))[::-1])
-        values = [*(f"{value:8.0f}" for value in q), *(f"{value:8.2f}" for value in pose_values)]
+        values = [*(f"{value:8.0f}" for value in q), *(f"{value:8.2f}" for value in on_pendant(T))]
         lines += ["  ".join(values), f"the pendant shows: {'  '.join(['________'] * len(pose))}"]
     return [*lines, PLAN_SAFE[bool(found.shapes)]]
 

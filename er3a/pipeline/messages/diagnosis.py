@@ -68,8 +68,8 @@ TEXTS = texts(
         "wrong_value": "{entry} is {given}, {fits} fits",
         "wrong_scale": "wrong scale of all lengths: a factor of {factor:.6g} fits",
         "reversed_direction": "direction of J{joint} reversed",
-        "base_elsewhere": "base defined elsewhere: arm at ({shift_mm:, }) mm from there, turned {turn_deg:g} deg",
-        "flange_elsewhere": "flange defined elsewhere: ({shift_mm:, }) mm from there, turned {turn_deg:g} deg",
+        "base_elsewhere": "base defined elsewhere: arm at ({shift_mm:, }) mm from there, turned {turn_deg:g}°",
+        "flange_elsewhere": "flange defined elsewhere: ({shift_mm:, }) mm from there, turned {turn_deg:g}°",
         "counted_from_ground": "counted from the ground: the table's J{joint} is the references' {sum}",
         "wrong_unit": "{entries:entries}: {misread:misread}",
         "swapped_entries": "[J{joint}][every joint{joint:!}]: a and d are swapped",
@@ -81,16 +81,16 @@ TEXTS = texts(
         ),
         "met": "Nothing to explain: {references} of {references} references about poses, axes and limits are met.",
         "named": (
-            "Most likely fault: {faults: and }. Residual: {residual_before:residual} {unit}, corrected "
-            "{residual_after:residual} {unit}."
+            "Most likely fault: {faults: and }. Residual: {residual_before:residual}{unit:unit}, corrected "
+            "{residual_after:residual}{unit:unit}."
         ),
         "mostly": (
             "Best fault tried, still beyond the references' uncertainty: {faults: and }. Residual: "
-            "{residual_before:residual} {unit}, corrected {residual_after:residual} {unit}."
+            "{residual_before:residual}{unit:unit}, corrected {residual_after:residual}{unit:unit}."
         ),
         "unexplained": (
-            "None of {tried} hypotheses of one fault or two explains the data: of {residual_before:residual} {unit} at "
-            "least {least:residual} {unit} stay. It is another arm, has more faults, or a reference is wrong."
+            "None of {tried} hypotheses of one fault or two explains the data: of {residual_before:residual}{unit:unit}"
+            " at least {least:residual}{unit:unit} stay. It is another arm, has more faults, or a reference is wrong."
         ),
         "one_of": "one of {count} that fit alike ({candidates:24; })",
         "moves_nothing": "{entry} has no effect on the measured points",

@@ -26,13 +26,13 @@ NEAREST_RULE = N_(
 TEXTS = texts(
     {
         "inverse.not_reproduced": (
-            "Don't trust the solver here: residuals up to {worst_mm:.2g} mm, {worst_deg:.2g} deg; joint angles of "
+            "Don't trust the solver here: residuals up to {worst_mm:.2g} mm, {worst_deg:.2g}°; joint angles of "
             "{lost} random poses not found again."
         ),
         "unsolved_target": "{name} ({obstacle})",
         "nothing_found": "no solution found",
         "nearest_regular": "the nearest that is not singular",
-        "tilt_missing": "{angle_deg:.3g} deg beyond the wrist's range",
+        "tilt_missing": "{angle_deg:.3g}° beyond the wrist's range",
         "branches_leave_limits": "solutions outside the limits: {count}",
         "branches_collide": "solutions that collide: {count}",
         "inverse.targets": (
@@ -47,13 +47,13 @@ TEXTS = texts(
         "near_limit": "Little margin: {margin:.2g} from a limit.",
         "at_singularity": "Singular ({kind:singular_pose}): come here by a joint move, not on a straight line.",
         "turn_tool": (
-            "Turn the tool by {least_turn_deg:.1f} deg, to roll, pitch, yaw = {to_deg:.2f, } deg. It then keeps "
-            "{margin_deg:g} deg from limits and {clearance_mm:g} mm clear; {orientation_ratio:.2g} of orientations "
+            "Turn the tool by {least_turn_deg:.1f}°, to roll, pitch, yaw = {to_deg:.2f, }°. It then keeps "
+            "{margin_deg:g}° from limits and {clearance_mm:g} mm clear; {orientation_ratio:.2g} of orientations "
             "tried have a solution."
         ),
         "shift_tool": (
             "Move the part or the base by {shift_mm:.0f} mm, the tool to ({to_mm:.1f, }) mm. It then keeps "
-            "{margin_deg:g} deg from limits and {clearance_mm:g} mm clear."
+            "{margin_deg:g}° from limits and {clearance_mm:g} mm clear."
         ),
     }
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.finding import Amount
-from er3a.pipeline.language import N_, tr, words
+from er3a.pipeline.language import words
 from er3a.pipeline.messages.say import WORDS, says, sentence, texts
 from er3a.planning.motion_faults import RateCause, rate_ratio
 from er3a.planning.names import StrategyName
@@ -22,14 +22,13 @@ STRATEGIES: dict[StrategyName, str] = words(
 )
 
 FAR = 10.0  # times a limit, beyond which a rate is rounded to two digits: the others depend on where it was sampled
-UNITS = (N_("deg/s²"), N_("deg/s³"))
 UNBOUNDED = 300.0  # times a limit, beyond which a rate is no figure: towards the edge of the reach it has no bound
 
 
 TEXTS = texts(
     {
-        "above_limit": "J{joint} reaches {reached_deg:.1f} deg; upper limit {limit_deg:g} deg",
-        "below_limit": "J{joint} reaches {reached_deg:.1f} deg; lower limit {limit_deg:g} deg",
+        "above_limit": "J{joint} reaches {reached_deg:.1f}°; upper limit {limit_deg:g}°",
+        "below_limit": "J{joint} reaches {reached_deg:.1f}°; lower limit {limit_deg:g}°",
         "must_stand_still": "the arm would have to stop along the path",
         "no_time_law_found": "no timing found within the joints' limits",
         "library_missing": "the library {name} is not installed; it has wheels for Linux on x86-64 only",
@@ -46,7 +45,7 @@ TEXTS = texts(
         "no_bend_keeps_distance": "no bend up to {up_to:.0f} keeps the distance",
         "bent_path_singular": "the bent path runs into another singular region",
         "path_not_finished": "only {done:.0%} of the path is completed",
-        "ends_off_path": "it ends {distance_mm:.3g} mm and {angle_deg:.3g} deg from the path's end",
+        "ends_off_path": "it ends {distance_mm:.3g} mm and {angle_deg:.3g}° from the path's end",
         "rate_exceeded": "a joint needs {ratio:.2f} times its greatest {rate:rate}",
         "rate": (
             "J{joint} needs [{needed:.0f}][over {times:g} times as much][a step of its acceleration{step:?}]; limit "
@@ -60,11 +59,6 @@ TEXTS = texts(
 )
 WORDS["end"] = words({"start": "start", "end": "end"})
 WORDS["rate"] = words({"speed": "speed", "acceleration": "acceleration"})
-
-
-def unit_of(slides: bool) -> str:
-    """Of values of a joint."""
-    return "mm" if slides else tr("deg")
 
 
 @says("too_fast", "acceleration_too_great", "jerk_too_great")

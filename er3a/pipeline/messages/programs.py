@@ -99,7 +99,7 @@ NOT_FOLLOWED: dict[NotFollowedReason, str] = words(
         "instruction": "Put the module that holds it beside the program; if it moves nothing, say so by --assume.",
         "tool": FRAMES,
         "base": FRAMES,
-        "half_turn": "Turn the tool in two lines by 90 deg each, or by a joint motion.",
+        "half_turn": "Turn the tool in two lines by 90° each, or by a joint motion.",
         "unreached": "Check what leads to this motion, or remove it if nothing does.",
     }
 )
@@ -134,8 +134,8 @@ TEXTS = texts(
         "way_not_known": "start of the motion unknown; only the target was checked",
         "configuration_guessed": "{solutions} solutions possible: the joints before are not known",
         "configuration_not_met": "no solution within the limits, or not the line's end, has the configuration {text}",
-        "whole_turn": "J{joint} turns by {angle_deg:.1f} deg; its nearest equivalent is {nearest_deg:.1f} deg away",
-        "joint_jumps": "J{joint} turns by {angle_deg:.1f} deg while the tool moves {moved_mm:.1f} mm",
+        "whole_turn": "J{joint} turns by {angle_deg:.1f}°; its nearest equivalent is {nearest_deg:.1f}° away",
+        "joint_jumps": "J{joint} turns by {angle_deg:.1f}° while the tool moves {moved_mm:.1f} mm",
         "clear_of_assumed": "{pair}: {clearance_mm:.1f} mm clear; assumed shapes may be off by {margin_mm:g} mm",
         "clearance_not_proven": "clear at points of the way; not settled between them in the given time",
         "zone_collides": "blending zone allows a collision ({assumed:shapes}): {pair}, {depth_mm:.1f} mm deep",
@@ -159,7 +159,7 @@ TEXTS = texts(
         "program_nothing_moves": "no instruction moves the arm",
         "load_above_payload": "{mass_kg:g} kg on the flange; payload {payload_kg:g} kg",
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
-        "remedy.limit": "Keep J{joint} within {limit:g} deg; turn or move a target given as a pose.",
+        "remedy.limit": "Keep J{joint} within {limit:g}°; turn or move a target given as a pose.",
         "remedy.solid": (
             "[Add a via point around {name}: the target itself is clear.{there:!}][Move the target away from "
             "{name}: they overlap there.{there:?}]"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from er3a.finding import Amount, Finding, is_one
 from er3a.pipeline.language import as_text, own_title, tr, with_unit, words
 from er3a.pipeline.messages.pages import SIDES
@@ -28,7 +30,7 @@ STATUS_WORDS = words(
         "settled_up_to_signs": "settled but for signs",
         "weak": "weak",
         "contradicted": "contradicted",
-        "consistent": "one source",
+        "consistent": "its own source only",
         "open": "open",
         "gauge": "free choice",
         "given": "given",
@@ -98,7 +100,7 @@ TEXTS = texts(
         "motion_of_joint": "+J{joint}: {motion}",
         "entry_of_table": "{column}{joint}, measured",
         "read_limit": "read J{joint}'s {side:side} in the controller's settings",
-        "time_joint": "in a cleared cell, time a long turn of J{joint} (±{half_width_deg_s:g} deg/s)",
+        "time_joint": "in a cleared cell, time a long turn of J{joint} (±{half_width_deg_s:g}°/s)",
         "measure_entry": "measure {own_entry} to ±{half_width:g}: {what}",
         "look_at_motion": ("in a cleared cell, at T1, jog +J{joint} from {start}: seen from behind the arm, {motion}?"),
         "not_the_robot_described": (
@@ -106,7 +108,7 @@ TEXTS = texts(
             "{mismatch_mm:.0f} mm; {tried} corrections of one or two entries leave {left_mm:.1f} mm or more."
         ),
         "inconsistent_with_own_text": (
-            "The table contradicts its own text ({against:own; })[, which asks for {entry} = {needed:g} "
+            "The table contradicts its own text ({against:own; })[, which asks for {entry} = {needed:g}"
             "{unit:unit}, not {given:g}. The text is no evidence about a real robot.][; no single correction "
             "mends it.{entry:!}]"
         ),
@@ -121,7 +123,7 @@ WORDS.update(
         "segment": SEGMENT_WORDS,
     }
 )
-FORMATS["unit"] = tr
+FORMATS["unit"] = partial(with_unit, "")
 
 
 AT_POSE = ("point_at_pose", "orientation_at_pose", "pose_excess")

@@ -43,7 +43,7 @@ from er3a.finding import Amount
 from er3a.finding import Finding as Found
 from er3a.pipeline import language
 from er3a.pipeline.language import N_, tr
-from er3a.pipeline.messages.numbers import at_least, at_most
+from er3a.pipeline.messages.numbers import at_least
 
 LONGEST, EXCERPT = 2_000, 200  # letters
 _texts: dict[str, str] = {}
@@ -59,7 +59,6 @@ _SEVERAL = re.compile(r"(\d*)([\w.+]*?)(; |, |\. | or | and | |)")
 FORMATS: dict[str, Callable[[Any], str]] = {
     "own": language.own_title,
     "at_least L": lambda litres: at_least(litres, "L"),
-    "at_most L": lambda litres: at_most(litres, "L"),
     "at_least %": lambda ratio: f"{at_least(100 * ratio, 1)} %",
 }
 """Formats of fields besides those of Python and the tables of words; modules of messages add theirs."""

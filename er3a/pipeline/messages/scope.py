@@ -98,7 +98,7 @@ ASSUMED: Mapping[str, str] = words(
         "mounting": "the base stands upright",
         "real_camera": "the camera is simulated",
         "joint_zeros": "joint zeros",
-        "small_joint_zeros": "joint zeros are right to {amount:g} deg",
+        "small_joint_zeros": "joint zeros are right to {amount:g}°",
         "touched_points": "no touched points confirm the result",
         "given_intrinsics": (
             "the intrinsics are exact (a principal point 1 % of the focal length off turns the camera 0.6°)"

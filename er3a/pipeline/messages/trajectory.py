@@ -93,8 +93,8 @@ TEXTS = texts(
         "advice.clear": "{clearance:.1f} mm clear",
         "advice.slowly": "It is quicker than the {programmed:.2f} s programmed: another motion",
         "advice.region": "It still passes near the singular pose",
-        "advice.tool": "the tool [leaves the path by {far} mm, {turned} deg][stays on the path{far:!}]",
-        "advice.swing": "J{joint} turns by {swing:.0f} deg",
+        "advice.tool": "the tool [leaves the path by {far} mm, {turned}°][stays on the path{far:!}]",
+        "advice.swing": "J{joint} turns by {swing:.0f}°",
         "advice.switch": (
             "[It begins at other joint angles ({changes:, }): the way there was not checked][The move to the other "
             "solution is part of it and was checked{changes:!}]"

@@ -22,7 +22,7 @@ SELF_CHECKS = words(
         "crossed_limits": "joints whose lower limit is above the upper one",
         "odd_directions": "joint directions other than +1 and -1",
         "length_unit": "lengths in another unit (longest below 10 mm or above 20 m)",
-        "limit_unit": "limits in another unit (widest below 6.3 deg)",
+        "limit_unit": "limits in another unit (widest below 6.3°)",
         "closed_form": "properties lacking for a closed-form inverse (parallel axes 2 and 3, spherical wrist)",
         "joints_to_pose_to_joints": "joints to pose to joints",
         "unsolved_poses": "random poses without any solution",
@@ -74,12 +74,10 @@ TEXTS = texts(
         "claims": "Statements without a document (“claims”) in {reference_set} that fail: {failed} of {claims}.",
         "counted_checks": "{passed} of {total} {kind:check_kind} checks pass",
         "validation.off": (
-            "If {entry} is wrong, the tool is off by {bound} {mm:.0f} mm and {deg:.0f} deg.[ A tool's tip is then "
+            "If {entry} is wrong, the tool is off by {bound} {mm:.0f} mm and {deg:.0f}°.[ A tool's tip is then "
             "off by up to {factor:.2g} times its distance from the flange. Run no Cartesian target with a tool before.]"
         ),
-        "validation.parts": (
-            "Confirmed by independent documents (to {mm:g} mm and {deg:g} deg at the tool): {parts:, }."
-        ),
+        "validation.parts": ("Confirmed by independent documents (to {mm:g} mm and {deg:g}° at the tool): {parts:, }."),
         "validation.open": "Not confirmed: {names}.",
         "validation.unbounded": (
             "Only the table's own source gives {names}: nothing bounds the tool's error if they are wrong."

@@ -61,7 +61,7 @@ TEXTS = texts(
             "and run again.[ No tool is given: repeat it with your tool's length.{bare:?}]"
         ),
         "box.sampled": (
-            "the tool, up to {cone:g} deg from {axis}, reaches all points sampled above the tray's lowest "
+            "the tool, up to {cone:g}° from {axis}, reaches all points sampled above the tray's lowest "
             "{served_from} mm; clearance was sampled, without tray and stand"
         ),
         "workspace.tool_points_elsewhere": (
@@ -82,7 +82,7 @@ def _(found: Finding) -> str:
 
 
 def _limit(limit: Finding, at: float) -> str:
-    """A limit at a value, such as "J3 ≤ 65 deg"."""
+    """A limit at a value, such as "J3 ≤ 65°"."""
     value = with_unit(as_text(at, ".4g"), limit.unit)
     return f"{sum_of_joints(limit.joints, limit.factors)} {'≤' if limit.side == 'upper' else '≥'} {value}"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import singledispatch
 
 from er3a.pipeline.language import tr, with_unit
-from er3a.pipeline.messages.numbers import at_least, fixed, number
+from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.stages.collision.model import CollisionResults
 from er3a.pipeline.stages.dynamics.model import DynamicsResults
 from er3a.pipeline.stages.inverse.model import InverseResults
@@ -14,6 +14,7 @@ from er3a.pipeline.stages.programs.page.played import faults as program_faults
 from er3a.pipeline.stages.trajectory.model import TrajectoryResults
 from er3a.pipeline.stages.trajectory.page.played import faults as path_faults
 from er3a.pipeline.stages.validation.model import ValidationResults
+from er3a.pipeline.stages.validation.page.evidence_section import known_alone
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import sound_motions
@@ -41,21 +42,21 @@ def _(results: ValidationResults) -> Glance:
     summary = results.summary
     counts, evidence = summary.counts.independent, summary.evidence
     bad, open_ = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
+    known = known_alone(evidence) if evidence else 0
     value = f"{counts.passed}/{counts.total}" if counts.total else "–"
     if summary.verdict.status == "fail":
         return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
-    return value, tr("sources disagree") if summary.conflicts else tr(
-        "{count} not settled", count=open_
-    ) if open_ else ""
+    if summary.conflicts:
+        return value, tr("sources disagree")
+    return value, tr("{count} of {all} settled", count=known - open_, all=known) if open_ else ""
 
 
 @glance.register
 def _(results: WorkspaceResults) -> Glance:
     summary = results.summary
-    enclosed = summary.enclosed_voids
-    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in enclosed), "L"), "L")
+    volume = summary.volume_m3
     far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
-    return far, tr("void {size}", size=litres) if enclosed else tr("no void")
+    return far, with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³")
 
 
 @glance.register

@@ -23,7 +23,6 @@ from er3a.pipeline.results import THE_CODE, THE_SETTINGS, Provenance, Stored, is
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
-from er3a.pipeline.stages.workspace.page.workspace_figures import void_label
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
@@ -178,10 +177,10 @@ def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
 def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
     """The arm that may be relied on, with its voids, and over it the wrong one."""
     name = drawn[0].name
-    floor, known = floor_of(study.scene(name, "trajectory")), _reach(stored[name])
+    floor = floor_of(study.scene(name, "trajectory"))
     floor_mm = None if floor is None else 1000 * floor
     seen = [_seen(study, entry.name, entry.use, stored[entry.name]) for entry in drawn]
-    labels = [void_label(number, void) for number, void in enumerate(known.enclosed_voids, 1)] if known else []
+    labels = []
     for arm in seen:
         lowest = arm.points_mm[arm.points_mm[:, 1].argmin()]
         if floor_mm is not None and lowest[1] < floor_mm:
@@ -206,7 +205,7 @@ def _seen(study: Study, name: str, use: str, stored: Results) -> SeenArm:
 
 
 def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
-    """What to confirm before the real arm moves, each with the row of the validation's page that says how."""
+    """What to confirm before the real arm moves, each with the place on the validation's page that says how."""
     results = stored["validation"].results if "validation" in stored else None
     address = f"{chosen.name}/validation.html"
     if not isinstance(results, ValidationResults):
@@ -218,12 +217,11 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     limits = [entry for entry in unsettled if column_of(entry) in LIMITS]
     named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
     asked = (
-        (tr("Jog each joint: does it turn as drawn?"), directions),
-        (tr("Read five poses: they settle {names}.", names=named), left),
-        (tr("Enter limits and speeds from the controller."), limits),
+        (tr("Jog each joint: does it turn as drawn?"), directions, "cell-direction1"),
+        (tr("Read five poses: they settle {names}.", names=named), left, "poses"),
+        (tr("Enter limits and speeds from the controller."), limits, f"entry-{limits[0]}" if limits else ""),
     )
-    rows = ((text, f"{address}#entry-{entries[0]}" if entries else address) for text, entries in asked)
-    return [row for row, (_, entries) in zip(rows, asked) if entries or not evidence]
+    return [(text, f"{address}#{place}") for text, entries, place in asked if entries or not evidence]
 
 
 def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Mapping[str, Results]) -> list[Any]:

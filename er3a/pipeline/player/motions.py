@@ -131,17 +131,24 @@ class PlayedMotion:
 
 
 def at_rest(
-    robot: Robot, name: str, text: str = "", weight: Weight = "plain", q: Reals | None = None, **more: Any
+    robot: Robot,
+    name: str,
+    text: str = "",
+    weight: Weight = "plain",
+    q: Reals | None = None,
+    bodies: tuple[str, ...] = (),
+    **more: Any,
 ) -> PlayedMotion:
     """The arm for a second in one pose, of which ``text`` is said.
 
     Parameters
     ----------
     q : (n,), rad or m; None for the arm's home, or zeros where it has none
+    bodies : that are red
     more : of a :class:`PlayedMotion`
     """
     pose = next(each for each in (q, robot.home, np.zeros(robot.joints)) if each is not None)
-    events = [PlayedEvent(0.0, 1.0, text, weight)] if text else []
+    events = [PlayedEvent(0.0, 1.0, text, weight, bodies)] if text else []
     return PlayedMotion(name, "", np.array([0.0, 1.0]), np.tile(pose, (2, 1)), events, **more)
 
 
@@ -199,8 +206,6 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
     for fault in faults:
         if fault.to_do:
             place = fault.instead[1] if fault.instead else fault.address
-            text = re.sub(
-                r"(?<=\d) (?=(mm|s|deg|%))", "\u00a0", first_sentence(fault.to_do)[0]
-            )  # units stay with values
+            text = re.sub(r"(?<=\d) (?=(mm|s|%))", "\u00a0", first_sentence(fault.to_do)[0])  # units stay with values
             return Fix(joined((fault.name, text), ": "), place, fault.status != "caution")
     return None

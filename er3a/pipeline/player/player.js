@@ -139,7 +139,7 @@ function draw() {
   for (const { from, to, text } of marks) {
     const css = touching.size ? page.touching : page.ink;
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
-    else space.line([from, to], ...(text ? [data.colours.mark, 3] : [data.colours.sight, 1.5, false]));
+    else space.line([from, to], ...(text ? [page.ink, 3] : [data.colours.sight, 1.5, false]));
     if (text) space.word(text, scaled(add(from, to), 0.5), css);
   }
   if (motion.loads) tellLoads(poses[0]);

@@ -136,7 +136,7 @@ def _data(
         **arm,
         "others": [{"table": table_data(arm), **drawn_arm(arm)} for arm in beside],
         "signs": [{"text": text, "at": (at - [0, 0, 0.1 * size]).tolist()} for text, at in zip(signs, bases)],
-        "colours": {"mark": INK, "sight": REFERENCE, "touching": TOUCHING, **COLOURS},
+        "colours": {"sight": REFERENCE, "touching": TOUCHING, **COLOURS},
         "axes": AXES,
         "floor": floor,
         "solutions": SOLUTIONS,

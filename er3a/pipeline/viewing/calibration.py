@@ -18,7 +18,7 @@ from er3a.files.robot_writer import robot_file, robot_text
 from er3a.numerics.arrays import Reals
 from er3a.pipeline import language
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.language import N_, as_text, tr
+from er3a.pipeline.language import N_, as_text, tr, unit_sign
 from er3a.pipeline.messages.calibration import (
     VERDICTS,
     file_text,
@@ -207,7 +207,7 @@ def _entries(found: Calibration) -> list[list[str]]:
             fixed(each.correction, 4),
             fixed(each.half_width, 4),
             fixed(each.nominal + each.correction, 4),
-            tr(each.unit),
+            unit_sign(each.unit),
         ]
         for each in found.estimates
     ]

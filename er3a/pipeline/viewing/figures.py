@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -27,8 +27,9 @@ from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 from matplotlib.ticker import FixedLocator
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline import language
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import tr, unit_sign
 from er3a.pipeline.messages.say import bracketed
 from er3a.pipeline.tables import Table
 from er3a.pipeline.viewing.palette import GRID, INK, MUTED, SIX_JOINTS
@@ -241,6 +242,29 @@ def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: floa
     return figure, figure.subplots(rows, columns, **subplots)
 
 
+def bars(names: Sequence[str], sizes: Reals, texts: Sequence[str], colours: Sequence[str]) -> tuple[Figure, Axes]:
+    """Level bars under each other, the first on top, each with a text at its end.
+
+    Parameters
+    ----------
+    names : of the bars
+    sizes : (n,), not below 0
+
+    Returns
+    -------
+    figure, axes : the latter still without a label
+    """
+    figure, ax = new_figure(width=5.2, height=3.5)
+    places = np.arange(len(names))
+    ax.barh(places, sizes, 0.6, color=colours)
+    for place, size, text in zip(places, sizes, texts):
+        ax.annotate(text, (max(size, 0.0), place), (7, 0), textcoords="offset points", va="center")
+    ax.set_yticks(places, names)
+    ax.invert_yaxis()
+    ax.margins(x=0.45)
+    return figure, ax
+
+
 def equal_scale(axes: Axes, x_label: str, y_label: str, fill: bool = True) -> None:
     """Make a drawing true to scale: equal units on both axes.
 
@@ -271,7 +295,7 @@ def axis_label(table: Table | type[Table], attribute: str, unit: str = "") -> st
     """
     spec = table.columns()[attribute]
     what, unit = tr(spec.heading or spec.meaning), (unit or spec.unit).replace("^2", "²").replace("^3", "³")
-    return bracketed(what, tr(unit))
+    return bracketed(what, unit_sign(unit))
 
 
 def svg_data_uri(figure: Figure) -> Markup:

@@ -293,7 +293,7 @@ def head_of(stored: Stored[Any]) -> Head:
             figure.name,
             language.translated(f"{stage}.figure", words[figure.name]),
             figure.value,
-            tr("of {total}", total=figure.of) if figure.of is not None else tr(figure.unit),
+            tr("of {total}", total=figure.of) if figure.of is not None else language.unit_sign(figure.unit),
             figure.uncertainty,
             figure.unit,
         )
@@ -365,8 +365,7 @@ def render(
             **context,
         )
     )
-    html = closed_up(html) if language.current() == "zh" else DEGREES.sub(lambda found: found[1] or "°", html)
-    write_text(output, html)
+    write_text(output, closed_up(html) if language.current() == "zh" else html)
 
 
 class _Compiled(dict[str, bytes]):
@@ -482,8 +481,6 @@ def _tray_edges(study: Study, stored: Stored[Any]) -> str:
     return " × ".join(f"{edge:g}" for edge in study.section(CapabilitySettings).placement.box_mm)
 
 
-# "deg" in sentences that the command line says, too: pages have one sign for it; a file's own words stay.
-DEGREES = re.compile(r"(<code>[^<]*</code>)|(?<=[\d)])[ \u00a0]deg\b|(?<=[(> \u00a0])deg\b(?=[/)²³<;,. ])")
 BRACKETS = re.compile(r"(?<=>)(?<!<code>)([^<>()]{1,40}) \(([^<>()]{1,20})\)(?=</t[hd]>)")
 STOPS = re.compile(r"(</(?:a|code|em|strong)>)\.(?=[\s<])")
 BLANKS = re.compile(

@@ -101,9 +101,9 @@ class Curves:
         if robot.slides.all():
             title = f"Joint {'position' if name == 'angle' else name} (mm{per})"
         elif slides:  # short enough for the head of a panel
-            title = f"{name.capitalize()} (deg{per}, {slides}: mm{per})"
+            title = f"{name.capitalize()} (°{per}, {slides}: mm{per})"
         else:
-            title = f"Joint {name} (deg{per})"
+            title = f"Joint {name} (°{per})"
         return cls(entity, title, limits=in_units(robot, ends))
 
 

@@ -33,6 +33,9 @@ THICKEST = 0.13  # of the arm's own extent
 SCALES_MM = (100, 200, 500, 1000, 2000)
 
 
+SMOOTHED = 16  # times that a corner of an outline goes to the middle between it and the next
+
+
 @dataclass(frozen=True, eq=False)
 class SeenArm:
     """An arm from the side.
@@ -244,7 +247,7 @@ def border_lines(arc: Integers, rho_m: Reals, z_m: Reals) -> list[Reals]:
 
     Returns
     -------
-    rings : (m, 2) each, mm
+    rings : (m, 2) each, mm, without the steps of the cells
     """
     rings: list[Reals] = []
     for each in np.unique(arc):
@@ -254,6 +257,8 @@ def border_lines(arc: Integers, rho_m: Reals, z_m: Reals) -> list[Reals]:
             rings.append(np.concatenate([ring, mirrored[::-1]]))
         else:
             rings += [ring, mirrored]
+    for _ in range(SMOOTHED):
+        rings = [(ring + np.roll(ring, -1, axis=0)) / 2 for ring in rings]
     return rings
 
 

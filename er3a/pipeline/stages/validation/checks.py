@@ -23,6 +23,7 @@ from er3a.identifiability.statements import (
     inconsistent_with_own_text,
     is_another_arm,
     not_the_robot_described,
+    title_of,
 )
 from er3a.kinematics import round_trips
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
@@ -73,7 +74,7 @@ def checks_of_set(
 
     ``bases`` (n,): what each of these checks rests on; ``slides`` : of each joint; ``size`` : of the arm, mm.
     """
-    stated = _Stated(references.name, references.checkable, values, bases, size)
+    stated = _Stated(references, values, bases, size)
     checks = [stated.check(i) for i in range(len(values))]
     aside = [
         _without_value(references.name, reference, fact("not_of_this_arm", reason=why, joints=len(slides)))
@@ -93,10 +94,10 @@ class _Stated:
     size : mm, of the arm, or of what the references say of it
     """
 
-    def __init__(
-        self, set_name: str, references: tuple[Reference, ...], values: Reals, bases: Sequence[CheckBasis], size: float
-    ):
-        self.set_name, self.references, self.values, self.bases = set_name, references, values, bases
+    def __init__(self, own: ReferenceSet, values: Reals, bases: Sequence[CheckBasis], size: float):
+        references = own.checkable
+        self.set_name, self.references, self.values, self.bases = own.name, references, values, bases
+        self.documents = own.documents
         self.expected, self.tolerance = expected_of(references)
         self.met = np.abs(values - self.expected) <= self.tolerance + ROUNDING
         self.pairs = conflicts(references)
@@ -156,6 +157,7 @@ class _Stated:
                 met=bool(self.met[i]),
                 source=self.references[i].source,
                 grade=self.references[i].grade,
+                document=title_of(self.references[i].document, self.documents),
             )
             for i in rows
         )

@@ -103,6 +103,7 @@ class Statement:
     met: bool
     source: str
     grade: Grade
+    document: str = ""
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ def motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
         rows = results.torques.take(results.torques.path == path.name)
         felt = [load for load in path.joints if load.peak > FELT * path.hardest.peak]
         peaks = [PlayedEvent(load.peak_at_s, load.peak_at_s, _peak(load), "plain") for load in felt]
-        motions.append(PlayedMotion(path.name, "", rows.t_s, meant(robot, rows.q), peaks, loads=rows.torque))
+        motions.append(PlayedMotion(path.name, path.name, rows.t_s, meant(robot, rows.q), peaks, loads=rows.torque))
     return motions
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.language import own_title, tr, with_unit, words
 from er3a.pipeline.messages.dynamics import BINDING, payload_key, payload_text, quantity_word
 from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of_column, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, word
@@ -17,10 +17,10 @@ from er3a.pipeline.player.motions import at_rest
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
-from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, motions, within
+from er3a.pipeline.stages.dynamics.page.played import FELT, hanging, held, holding_name, motions, within
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
-from er3a.pipeline.viewing.figures import axis_label, new_figure
+from er3a.pipeline.viewing.figures import axis_label, bars, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS
 from er3a.robots.robot import Robot
@@ -55,9 +55,10 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         )
     )
     for part, style in zip(model.PARTS, STYLES):
-        if part == "tool" and not rows.tool.any():
+        values = getattr(rows, part)[:, worst]
+        if np.abs(values).max() < FELT * load.peak:
             continue
-        parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
+        parts.plot(rows.t_s, values, color=INK, linestyle=style, label=names[part])
     parts.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     parts.set_ylabel(tr("J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     parts.set_xlabel(axis_label(rows, "t_s"))
@@ -75,15 +76,9 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
     lever = kg @ off
     far = off @ lever / np.linalg.norm(lever)
     torques = abs(held.torque) * kg * far / (kg @ far)
-    figure, ax = new_figure(width=5.2, height=3.5)
-    places = np.arange(len(links))
-    ax.barh(places, torques, 0.6, color=[JOINTS[each.link - 1] for each in links])
-    for place, torque, mass, way in zip(places, torques, kg, far):
-        text = f"{with_unit(number(mass, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}"
-        ax.annotate(text, (max(torque, 0.0), place), (7, 0), textcoords="offset points", va="center")
-    ax.set_yticks(places, [tr("link {number}", number=each.link) for each in links])
-    ax.invert_yaxis()
-    ax.margins(x=0.35)
+    texts = [f"{with_unit(number(m, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}" for m, way in zip(kg, far)]
+    names = [tr("link {number}", number=each.link) for each in links]
+    figure, ax = bars(names, torques, texts, [JOINTS[each.link - 1] for each in links])
     ax.set_xlabel(axis_label(model.TorqueRows, "torque", held.unit))
     caption = tr("What each link adds to J{joint}: its mass times its level distance.", joint=held.joint)
     return Picture(figure, caption, caption)
@@ -92,6 +87,8 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
 MAX_USES = 12
 NONE = "–"
 LEAST = 0.01  # N m or N, below which no motor feels anything
+SEEN = 0.02  # of a bar, below which it is a speck
+WITHOUT = words({"load": "load", "friction": "friction", "rotor_inertias": "rotors", "link_masses": "some masses"})
 
 
 def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) -> None:
@@ -116,6 +113,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         links=_links(summary),
         uses=[_use(use) for use in summary.uses[:MAX_USES]],
         motors=_motors(summary.motors),
+        limited=_limited(summary),
         paths=[_path(path) for path in summary.paths if path.counts],
         not_run=joined((path.name for path in summary.paths if not path.counts), ", "),
         margins=any(path.payload or path.speed_scale for path in summary.paths),
@@ -159,7 +157,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
         size = with_unit(number(abs(held.torque), 2), held.unit)
         return Answer(tr("J{joint} holds {torque} at most.", joint=held.joint, torque=size), keys=[payload])
     worst = _worst(summary.motors)
-    limited = all(motor.peak_limit is not None for motor in summary.motors)
+    limited = _limited(summary)
     over = [f"J{motor.joint}" for motor in summary.motors if _mark(motor) == "fail"]
     if over:
         headline = tr("Too much for {joints}.", joints=joined(over, ", "))
@@ -168,15 +166,27 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
-    rows = [_row(motor, longest, _moment_of(results, motor)) for motor in order if limited or motor.peak >= LEAST]
-    if idle := order[len(rows) :]:
-        names = joined((f"J{motor.joint}" for motor in idle), ", ")
-        rows.append(ListRow("none", names, _sized(0.0, idle[0].unit), "#motors"))
-    still = [_held_row(each, longest) for each in order if each.holding >= LEAST]
+    rows = []
+    for motor in order:
+        if limited or motor.peak >= LEAST:
+            moment = _moment_of(results, motor)
+            name = joined([f"J{motor.joint}", moment[0]], ", ")
+            rows.append(_row(motor, motor.peak, name, moment, longest, motor.peak_limit))
+    if idle := [motor.joint for motor in order[len(rows) :]]:
+        loads = [load for path in summary.paths if path.counts for load in path.joints if load.joint in idle]
+        most = at_most(max(load.peak + load.tolerance for load in loads), 1)
+        names = joined((f"J{joint}" for joint in idle), ", ")
+        rows.append(ListRow("none", names, with_unit(f"≤ {most}", order[-1].unit), "#motors"))
+    still = [
+        _row(motor, motor.holding, name, (name, 0.0), longest)
+        for motor in order
+        if motor.holding >= LEAST and (name := holding_name(motor.joint))
+    ]
+    left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
     return Answer(
         headline,
         "",
-        "",
+        tr("Without {parts}.", parts=joined(left, ", ")) if left else "",
         [
             (moving, tr("J{joint} moving", joint=worst.joint)),
             (holding, tr("J{joint} holding", joint=worst.joint)),
@@ -187,6 +197,11 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     )
 
 
+def _limited(summary: model.DynamicsSummary) -> bool:
+    """Whether the limits of all motors are known."""
+    return all(motor.peak_limit is not None for motor in summary.motors)
+
+
 def _mark(motor: model.MotorNeed) -> Mark:
     """Whether a joint's greatest torque is within its limit; ``none`` where that is not known."""
     if motor.peak_limit is None:
@@ -194,28 +209,20 @@ def _mark(motor: model.MotorNeed) -> Mark:
     return "pass" if motor.peak <= motor.peak_limit else "fail"
 
 
-def _row(motor: model.MotorNeed, most: float, moment: tuple[str, float]) -> ListRow:
-    """A joint with its greatest torque as a bar, of the greatest of all joints or of its limit."""
-    note = _sized(motor.peak, motor.unit)
-    if motor.peak_limit:
-        note = tr("{value} of {limit}", value=number(motor.peak, 3), limit=_sized(motor.peak_limit, motor.unit))
-    name, full = joined([f"J{motor.joint}", moment[0]], ", "), motor.peak_limit or most or 1.0
-    return ListRow(_mark(motor), name, note, f"#{moment[0]}", moment, 1.0, _filled(motor.peak / full))
-
-
-def _held_row(motor: model.MotorNeed, most: float) -> ListRow:
-    """A joint with what it holds in its worst pose, as a bar of the greatest of all joints."""
-    name, note = holding_name(motor.joint), _sized(motor.holding, motor.unit)
-    return ListRow("none", name, note, f"#{name}", (name, 0.0), 1.0, _filled(motor.holding / most))
-
-
-def _filled(share: float) -> list[Part]:
-    return [Part(min(1.0, share), 1.0, "rest")]
+def _row(
+    motor: model.MotorNeed, value: float, name: str, moment: tuple[str, float], most: float, limit: float | None = None
+) -> ListRow:
+    """What a joint needs at a moment, as a bar of its limit, or else of the most that any joint needs."""
+    note, share = _sized(value, motor.unit), value / (limit or most or 1.0)
+    if limit:
+        note = tr("{value} of {limit}", value=number(value, 2), limit=_sized(limit, motor.unit))
+    parts, mark = [Part(min(1.0, share), 1.0, "rest")], _mark(motor) if limit else "none"
+    return ListRow(mark, name, note, f"#{moment[0]}", moment, float(share > SEEN), parts)
 
 
 def _sized(value: float, unit: model.Unit) -> str:
-    """A torque or force to three digits, of less than ``LEAST`` only that."""
-    return with_unit(number(value, 3) if value >= LEAST else f"< {LEAST}", unit)
+    """A torque or force to two digits."""
+    return with_unit(number(value, 2), unit)
 
 
 def _links(summary: model.DynamicsSummary) -> list[list[str]]:
@@ -244,9 +251,9 @@ def _use(use: model.Use) -> list[str]:
 def _units(summary: model.DynamicsSummary) -> dict[str, str]:
     """Units of torques, speeds and inertias in headings, by what the arm's joints do."""
     torque = model.shared_unit(held.unit for held in summary.holding)
-    turning, sliding = (tr("deg/s"), "kg m²"), ("mm/s", "kg")
+    turning, sliding = ("°/s", "kg m²"), ("mm/s", "kg")
     of_others = {model.TORQUE: turning, model.FORCE: sliding}
-    speed, inertia = of_others.get(torque, (tr("deg/s or mm/s"), tr("kg m² or kg")))
+    speed, inertia = of_others.get(torque, (tr("°/s or mm/s"), tr("kg m² or kg")))
     return {"torque": tr(torque), "speed": speed, "inertia": inertia}
 
 
@@ -267,7 +274,7 @@ def _motor(motor: model.MotorNeed, torque: int, power: int, inertia: int) -> lis
         *(fixed(value, torque) for value in (motor.peak, motor.rms, motor.holding)),
         fixed(motor.speed, 1),
         fixed(motor.power_w, power),
-        f"{fixed(motor.inertia_low, inertia)} – {fixed(motor.inertia_high, inertia)}",
+        " – ".join(dict.fromkeys((fixed(motor.inertia_low, inertia), fixed(motor.inertia_high, inertia)))),
         *(
             NONE if value is None else number(value, 3)
             for value in (

@@ -91,7 +91,7 @@ def _about(target: TargetResult, branches: SolutionRows) -> str:
             f"{_outcome(branches, k)} |"
             for k in np.argsort(branches.branch, kind="stable")
         ]
-        lines.append("\n".join(["| no. | branch | outcome (deg) |", "|---|---|---|", *rows]))
+        lines.append("\n".join(["| no. | branch | outcome (°) |", "|---|---|---|", *rows]))
     return "\n\n".join(line for line in lines if line)
 
 

@@ -10,12 +10,11 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.finding import is_one
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import NEAREST_RULE
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, listed, say
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
@@ -25,7 +24,6 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
 from er3a.pipeline.viewing.palette import SOLUTIONS
-from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 NO_BREAK_SPACE = "\u00a0"
@@ -51,7 +49,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target)) for target in chosen],
-        units=_units(robot),
+        sliding=_sliding(robot),
         colours=SOLUTIONS,
     )
 
@@ -79,13 +77,6 @@ def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) 
     headline = tr("{count} of {due} poses reached.", count=len(met), due=due)
     clear = [each.clearance.least_mm for each in met if each.clearance]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
-    if summary.round_trips:
-        keys.append(
-            (
-                number(summary.round_trips.solutions),
-                tr("solutions of {poses} random poses confirmed", poses=number(summary.round_trips.poses)),
-            )
-        )
     rows = [_row(each) for each in shown]
     return Answer(
         headline,
@@ -126,13 +117,9 @@ def _row(target: model.TargetResult) -> ListRow:
     return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), length, parts, fix)
 
 
-def _section(
-    robot: Robot,
-    target: model.TargetResult,
-    rows: model.SolutionRows,
-) -> dict[str, Any]:
+def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> dict[str, Any]:
     branches = best_of_branches(rows)
-    cells = _branch_rows(rows, branches)
+    cells = _branch_rows(branches)
     return dict(
         target=target,
         position=_listed(target.xyz_mm),
@@ -145,16 +132,15 @@ def _section(
         method="" if is_one(target.method, "closed_form") else say(target.method),
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
-        listed=_solutions_listed(robot, target.name, branches, cells),
+        listed=_solutions_listed(target.name, branches, cells),
         turned=rows.within_limits.sum() > branches.within_limits.sum(),
     )
 
 
 def _solutions_listed(
-    robot: Robot, target: str, branches: model.SolutionRows, cells: Sequence[Sequence[str]]
-) -> list[tuple[str, Markup, Markup, str, list[tuple[Any, ...]]]]:
-    """The branches as they are listed by the player: mark, where it shows each, its name, what came of it, and its
-    joint values."""
+    target: str, branches: model.SolutionRows, cells: Sequence[Sequence[str]]
+) -> list[tuple[str, Markup, Markup, str]]:
+    """The branches as they are listed by the player: mark, where it shows each, its name, and what came of it."""
     singular = np.asarray(branches.singular.any(axis=1))
     return [
         (
@@ -162,28 +148,8 @@ def _solutions_listed(
             stretch(target, k, k + SHOWN_S),
             moment(target, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
             cells[k][-1],
-            _against_limits(robot, branches.q_deg[k]),
         )
         for k in range(len(branches))
-    ]
-
-
-def _against_limits(robot: Robot, q_deg: Reals) -> list[tuple[Any, ...]]:
-    """Each joint that has limits: its number, its value and limits with their unit, then where the limits and the value
-    are, in percent of a scale that holds them all, and whether the value is between the limits."""
-    low, high = shown(robot, np.stack([robot.lower, robot.upper]))
-    start = np.minimum(low, q_deg)
-    percent = 100 / np.maximum(np.maximum(high, q_deg) - start, SAME)
-    places = np.stack([low - start, high - start, q_deg - start], axis=1) * percent[:, None]
-    inside = (low - SAME <= q_deg) & (q_deg <= high + SAME)
-    return [
-        (
-            j + 1,
-            *(fixed(value, 0) + (" mm" if robot.slides[j] else "°") for value in (q_deg[j], low[j], high[j])),
-            *places[j].tolist(),
-            bool(inside[j]),
-        )
-        for j in np.flatnonzero(~robot.continuous)
     ]
 
 
@@ -198,12 +164,11 @@ def _clearance(target: model.TargetResult) -> str:
     return tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else ""
 
 
-def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list[list[str]]:
-    inside = rows.branch[rows.within_limits]
+def _branch_rows(branches: model.SolutionRows) -> list[list[str]]:
     ranks = branches.rank[branches.rank > 0]
     cells = []
     for k in range(len(branches)):
-        place, turns = int((ranks <= branches.rank[k]).sum()), int((inside == branches.branch[k]).sum())
+        place = int((ranks <= branches.rank[k]).sum())
         cells.append(
             [
                 panel_link(branches.q_deg[k], _on_one_line(branches.label[k], int(branches.branch[k]))),
@@ -211,18 +176,18 @@ def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list
                 fixed(branches.limit_margin_deg[k], 1),
                 fixed(branches.manipulability[k], 3),
                 fixed(branches.greatest_move_deg[k], 1),
-                _outcome(branches, k, place, turns),
+                _outcome(branches, k, place),
             ]
         )
     return cells
 
 
-def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> str:
+def _outcome(branches: model.SolutionRows, k: int, place: int) -> str:
     if branches.refusal[k] is not None:
         return refusal_in_short(branches.refusal[k])
     taken = tr("chosen") if branches.rank[k] == 1 else tr("choice {place}", place=place)
-    if turns > 1:
-        taken = tr("{taken}; {turns} ways, ±360°", taken=taken, turns=turns)
+    move = with_unit(fixed(branches.greatest_move_deg[k], 0), "deg")
+    taken = tr("{taken}: joints move {move}", taken=taken, move=move)
     if (freed := float(branches.freed_turn_deg[k])) > SAME:
         taken = tr("{taken}; tool turned by {angle}", taken=taken, angle=with_unit(fixed(freed, 1), "deg"))
     return with_singularity(taken, branches, k)
@@ -233,10 +198,10 @@ def _on_one_line(label: str, branch: int) -> str:
     return branch_word(label, branch).replace("elbow ", "").replace(" ", NO_BREAK_SPACE)
 
 
-def _units(robot: Robot) -> str:
-    """The unit of joint values, or of most of them and of those that slide."""
-    sliding = [f"J{j + 1}" for j in np.flatnonzero(robot.slides)]
-    return tr("deg, {joints} in mm", joints=", ".join(sliding)) if sliding else tr("deg")
+def _sliding(robot: Robot) -> str:
+    """That some joints' values are in mm; empty where all turn."""
+    names = ", ".join(f"J{j + 1}" for j in np.flatnonzero(robot.slides))
+    return tr(", {joints} in mm", joints=names) if names else ""
 
 
 def _joints(q_deg: Iterable[float]) -> str:

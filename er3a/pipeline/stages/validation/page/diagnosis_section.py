@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from er3a.finding import is_one
-from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.language import N_, own_title, tr, unit_sign
 from er3a.pipeline.messages.diagnosis import both
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, sentence
@@ -67,7 +67,7 @@ def _hypothesis_row(hypothesis: model.RankedHypothesis) -> list[str]:
             more=len(alike),
         )
     numbers = [fixed(value, 1) for value in (hypothesis.residual_before, hypothesis.residual_after)]
-    return [typographic(words), *numbers, tr(hypothesis.unit), fixed(hypothesis.score, 1)]
+    return [typographic(words), *numbers, unit_sign(hypothesis.unit), fixed(hypothesis.score, 1)]
 
 
 def corrected_robot(robot: Robot, diagnoses: Iterable[model.SetDiagnosis]) -> tuple[Robot | None, str]:

@@ -7,16 +7,21 @@ from dataclasses import asdict
 from math import pi
 from typing import Any
 
+from er3a.confirmation.plan import plan
+from er3a.errors import Er3aError
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Status
 from er3a.pipeline.language import N_, tr, with_unit
+from er3a.pipeline.messages.confirm import on_pendant
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.pipeline.viewing.answer import ListRow
+from er3a.pipeline.viewing.page import panel_link
 from er3a.references.quantities import MM
 from er3a.references.reference import NO_DOCUMENT
+from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 MARKS: Mapping[Status, str] = {
@@ -29,7 +34,7 @@ MARKS: Mapping[Status, str] = {
     "gauge": "↔",
     "given": "·",
 }
-FIRST = 4  # entries to settle, named at the table's side
+FIRST = 8  # entries to settle, named at the table's side
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
     "a": "a (mm)",
@@ -101,6 +106,28 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
 def known_alone(evidence: TableEvidence) -> int:
     """How many entries of a table mean something alone."""
     return sum(each.value is not None and each.status != "gauge" for each in evidence.entries)
+
+
+def poses_to_read(robot: Robot) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows of the poses to read at the pendant; no rows where too few are safe.
+
+    Parameters
+    ----------
+    robot : the table alone, with its own base and the flange as tool
+    """
+    try:
+        found = plan(robot)
+    except Er3aError:
+        return [], []
+    units = ["mm" if slides else "°" for slides in robot.slides]
+    columns = [f"J{k} ({unit})>" for k, unit in enumerate(units, 1)]
+    columns += [f"{name} ({'mm' if name in 'XYZ' else '°'})>" for name in "XYZABC"]
+    poses = enumerate(zip(shown(robot, found.q), found.T), 1)
+    rows = [
+        [panel_link(q, str(k)), *(fixed(value, 0) for value in q), *(fixed(value, 2) for value in on_pendant(T))]
+        for k, (q, T) in poses
+    ]
+    return [tr("pose"), *columns], rows
 
 
 def plain_table(robot: Robot) -> tuple[list[str], list[list[str]]]:
@@ -227,10 +254,10 @@ def _interval(each: EntryEvidence) -> str:
 
 def _off(mm: float, deg: float) -> str:
     if fixed(mm, 1) == "0.0":  # of a turn in place, which "0.0 mm" would make look harmless
-        return tr("turned by {deg} deg", deg=fixed(deg, 0 if deg >= 10 else 1))
+        return tr("turned by {deg}°", deg=fixed(deg, 0 if deg >= 10 else 1))
     if fixed(deg, 1) == "0.0":
         return with_unit(fixed(mm, 0 if mm >= 10 else 1), "mm")
-    return tr("{mm} mm, {deg} deg", mm=fixed(mm, 0 if mm >= 10 else 1), deg=fixed(deg, 0 if deg >= 10 else 1))
+    return tr("{mm} mm, {deg}°", mm=fixed(mm, 0 if mm >= 10 else 1), deg=fixed(deg, 0 if deg >= 10 else 1))
 
 
 def _fits(each: EntryEvidence) -> str:

@@ -123,7 +123,7 @@ def _status(rows: KeyPoses, checks: Checks) -> Weight:
 
 def _text(rows: KeyPoses, pose: str) -> str:
     angles = ", ".join(f"{angle:g}" for angle in rows.q_deg[0].round(3))
-    lines = [f"### {pose}", f"joints ({angles}) deg", ""]
+    lines = [f"### {pose}", f"joints ({angles})°", ""]
     for point, deviation, source, grade in zip(rows.point, rows.deviation_mm, rows.source, rows.grade):
         if np.isfinite(deviation):
             lines.append(f"- {point.replace('_', ' ')}: off by **{deviation:.2f} mm**, {escaped(source)} ({grade})")

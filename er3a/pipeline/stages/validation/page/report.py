@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -18,7 +17,7 @@ from er3a.finding import is_one
 from er3a.identifiability.entries import column_of
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, own_title, tr, with_unit
+from er3a.pipeline.language import N_, own_title, tr, unit_sign, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured
 from er3a.pipeline.messages.pages import GRADE_NAMES
@@ -33,9 +32,10 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     known_alone,
     other_robot,
     plain_table,
+    poses_to_read,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
+from er3a.pipeline.viewing.answer import Answer, Fix
 from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
@@ -93,15 +93,6 @@ def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
     return rows
 
 
-KINDS = {
-    "independent": N_("independent documents"),
-    "consistency": N_("documents it is made from"),
-    "claim": N_("claims of a source"),
-    None: N_("the model itself"),
-}
-"""What a check rests on, as the page names it."""
-
-
 def check_row(check: Judged) -> list[str]:
     """A check in the columns of ``COLUMNS``."""
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
@@ -110,7 +101,7 @@ def check_row(check: Judged) -> list[str]:
         source = bracketed(own_title(check.source), grade)
     else:
         source = tr("the model itself")
-    return [say(check.subject), *values, f"{check.tolerance:g}", tr(check.unit), source]
+    return [say(check.subject), *values, f"{check.tolerance:g}", unit_sign(check.unit), source]
 
 
 def _value(value: float, check: model.Check) -> str:
@@ -120,19 +111,6 @@ def _value(value: float, check: model.Check) -> str:
     return fixed(value, DECIMALS[check.unit])
 
 
-def _by_kind(checks: Sequence[Judged]) -> Group:
-    """How many checks of each kind pass, each with its bar."""
-    rows = []
-    for kind, title in KINDS.items():
-        own = [check.status for check in checks if check.kind == kind]
-        passed, total = own.count("pass"), len(own)
-        mark: Literal["pass", "fail", "caution"] = "pass" if passed == total else "fail" if "fail" in own else "caution"
-        parts = [Part(passed / total, 1.0, mark)] if passed < total else ()
-        if own:
-            rows.append(ListRow(mark, tr(title), f"{passed}/{total}", "#checks", None, 1.0, parts))
-    return Group(tr("Checks"), rows)
-
-
 def report(study: Study, stored: Stored[model.ValidationResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, summary = stored.robot, stored.results.summary
@@ -140,7 +118,8 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     judged = [check for check in checks if not isinstance(check, model.Unjudged)]
     failed = sorted((each for each in judged if each.status == "fail"), key=lambda each: -each.tolerances_off)
     source = robot.sources.get("dh")
-    corrected, _ = diagnosis_section.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
+    table = robot_of(study.table(name)).replace(name=name)
+    corrected, _ = diagnosis_section.corrected_robot(table, summary.diagnoses)
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
     text = robot_text(file) if file else ""
     instead = (
@@ -165,8 +144,8 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         diagnoses=diagnosis_section.diagnosis_stories(summary),
         corrected=text,
         corrected_address=text_address(text),
+        poses=poses_to_read(table) if summary.verdict.status != "fail" else ([], []),
         groups=group_rows(judged),
-        by_kind=[_by_kind(judged)],
         failed=[*map(check_row, failed)],
         columns=COLUMNS,
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
@@ -224,8 +203,7 @@ def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[t
         labels.append(Label(say(each.subject), np.array([0.0, -step]), "open", SEEN, written_there=True))
         for row, stated in enumerate(each.statements, 2):
             kind: LabelKind = "right" if stated.met else "open"
-            source = re.split("[,，]", own_title(stated.source))[0]
-            text = joined([with_unit(fixed(stated.expected, 1), each.unit), source], ": ")
+            text = joined([with_unit(fixed(stated.expected, 1), each.unit), own_title(stated.document)], ": ")
             labels.append(Label(text, np.array([0.0, -step * row]), kind, written_there=True))
             lines += dimension(stated.expected, -step * (row + 0.5), -1.5 * step, kind)
     return labels, lines

@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from er3a.collision.pairs import names_of
 from er3a.files.vision_file import VisionFile
+from er3a.finding import is_one
 from er3a.geometry.transforms import inverted, posed
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, tr
@@ -16,7 +18,7 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, VisionResults, VisionSummary
-from er3a.pipeline.viewing.drawn import Shape, poses_at
+from er3a.pipeline.viewing.drawn import Shape
 from er3a.pipeline.viewing.palette import REFERENCE, VERDICTS
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -25,7 +27,6 @@ WAYS = {"move": N_("move to the approach"), "approach": N_("straight to the gras
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
 SIGHT = 0.08  # of the farthest distance, how far the drawn pyramid reaches: a longer one would outweigh the arm
 CAMERA_M = (0.09, 0.07, 0.07)
-SPECK_M = 1e-3  # length of the stroke that a name is written at
 SIDES = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]  # of a pyramid, its top first
 CONE = [*SIDES, *(side[::-1] for side in SIDES)]  # seen from both sides
 
@@ -44,22 +45,17 @@ def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[Play
 def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Reals) -> PlayedMotion:
     rows = results.ways.take(results.ways.target == each.name)
     if each.grasp is None or not len(rows):
-        place = _metres(each.xyz_mm)
+        hit = each.refusal.params if is_one(each.refusal, "grasp_collides") else {}
+        place = hit.get("near_m", _metres(each.xyz_mm))
+        bodies = names_of(hit["pair"]) if hit else ()
         mark = Mark(0.0, 1.0, place, place, "")
-        return at_rest(robot, each.name, refusal_text(each), "fail", home, marks=[mark])
+        q = np.array(hit.get("q", home))
+        return at_rest(robot, each.name, refusal_text(each), "fail", q, bodies, marks=[mark])
     parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
     events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
-    text = tr("{grasp}, turned by {turn} deg", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
+    text = tr("{grasp}, turned by {turn}°", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
     ghost = meant(robot, np.array(each.grasp.q_before_deg))
-    marks = [_ghost_name(robot, ghost, meant(robot, np.array(each.grasp.q_deg)), float(rows.t_s[-1]))]
-    return PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events, marks, ghosts=[ghost])
-
-
-def _ghost_name(robot: Robot, ghost: Reals, grasp: Reals, end_s: float) -> Mark:
-    """What the pale arm is, written where it is farthest from the arm at the grasp; joint values (n,), rad or m."""
-    before, there = (poses_at(robot, q)[:, :3, 3] for q in (ghost, grasp))
-    x, y, z = before[np.linalg.norm(before - there, axis=1).argmax()].tolist()
-    return Mark(0.0, end_s, (x, y, z), (x, y, z + SPECK_M), tr("before the approach"))
+    return PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events, ghosts=[ghost])
 
 
 def refusal_text(each: ObjectResult) -> str:

@@ -10,25 +10,26 @@ from markupsafe import Markup
 from matplotlib.ticker import MaxNLocator
 
 from er3a.files.hand_eye_file import HandEyeFile, grey_image
-from er3a.files.vision_file import load_vision
+from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load
+from er3a.finding import Finding
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.vision import pose_words
+from er3a.pipeline.messages.vision import MENDING, pose_words
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Part, all_caught
-from er3a.pipeline.viewing.figures import new_figure
+from er3a.pipeline.viewing.figures import bars, new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
     panel_link,
     render_stage,
 )
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, MUTED
 from er3a.robots.robot import Robot
 
 MAX_IMAGES = 9
@@ -58,13 +59,8 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes[1].set_xlabel(tr("sample"))
     axes[0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
-    worst = int(np.argmax(np.where(rows.used, sizes[0], 0.0)))
-    caption = tr(
-        "Worst residual used: {name}, {mm} mm.",
-        name=rows.sample[worst],
-        mm=fixed(sizes[0][worst], 2),
-    )
-    return Picture(figure, tr("Bars of the residual of each sample, in mm and in degrees"), caption)
+    caption = tr("Residual of each sample.")
+    return Picture(figure, caption, caption)
 
 
 def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
@@ -99,21 +95,27 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     for ax in axes.ravel()[len(shown) :]:
         ax.set_axis_off()
     axes[0, 0].legend(loc="lower left", fontsize=6)
-    by_board = float(np.sqrt(((rows.by_board_px - rows.seen_px)[rows.used] ** 2).sum(axis=1).mean()))
-    by_arm = float(np.sqrt((off[rows.used] ** 2).sum(axis=1).mean()))
     caption = tr(
         "Detected corners with lines towards their position by arm and calibration, magnified {scale:g} times; "
-        "the {shown} of {count} images with the greatest residuals. In the images used, detected corners are "
-        "{board} px (root mean square) from the board's own pose in the image (the camera's noise) and {arm} px"
-        " from the pose by the arm. Lines all in one direction: wrong pose of arm or board. Lines circling a "
-        "point: board detected the wrong way round. Short lines in all directions: noise.",
+        "the {shown} of {count} images with the greatest residuals. Lines all in one direction: wrong pose of arm or "
+        "board. Lines circling a point: board detected the wrong way round. Short lines in all directions: noise.",
         scale=scale,
         shown=len(shown),
         count=len(size),
-        board=fixed(by_board, 2),
-        arm=fixed(by_arm, 2),
     )
     return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
+
+
+def error_picture(each: model.ObjectResult, task: VisionFile) -> Picture:
+    """By how much the tool misses an object, by cause, and what the gripper tolerates."""
+    allowed = min(task.gripper.tolerance_mm), min(task.gripper.tolerance_deg)
+    sizes = [*((getattr(each.error_mm, part), getattr(each.error_deg, part)) for part in PARTS), allowed]
+    names = [*(word("vision.part_of_error", PARTS, part) for part in PARTS), tr("gripper's tolerance")]
+    texts = [f"{fixed(mm, 2)} mm, {fixed(deg, 2)}°" for mm, deg in sizes]
+    figure, ax = bars(names, np.array(sizes)[:, 0], texts, [*[MODEL] * len(PARTS), MUTED])
+    ax.set_xlabel(tr("error (mm)"))
+    caption = tr("What 95 % of errors stay below, by cause.")
+    return Picture(figure, caption, caption)
 
 
 AXES = ("x", "y", "z")
@@ -139,15 +141,13 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         _answer(robot, results),
         found=found,
         poses=_poses(found) if found else [],
-        suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
-        warnings=listed(found.warnings) if found else [],
+        suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
         slides=bool(robot.slides.any()),
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
-        errors=[_errors(each) for each in summary.objects if each.error_mm],
-        error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
+        errors=[(each, error_picture(each, task)) for each in summary.objects if each.error_mm],
         player=player(
             robot,
             motions(robot, results, task),
@@ -172,16 +172,18 @@ def _answer(robot: Robot, results: model.VisionResults) -> Answer:
     if summary.verdict.status == "caution":  # what was not checked comes before both
         headline, rest = joined([headline, rest], " "), ""
     keys = []
-    if found:
+    if off := [each.error_mm.together for each in grasped if each.error_mm]:
+        keys = [(with_unit(fixed(max(off), 1), "mm"), tr("error at the grasp, 95 %"))]
+    elif found:
         half = max(found.hand_eye.half_width_mm)
         keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [
-        Group(tr("Not graspable"), [row for row in shown if row.mark == "fail"]),
-        Group(tr("Within reach"), [row for row in shown if row.mark == "pass"]),
+        Group(tr("Not reachable"), [row for row in shown if row.mark == "fail"]),
+        Group(tr("Reachable"), [row for row in shown if row.mark == "pass"]),
     ]
     if found and (found.suspects or found.warnings):
-        rows = [ListRow("caution", each.sample, tr("left out"), "#samples") for each in found.suspects]
+        rows = [ListRow("caution", each.sample, _why_left_out(each), "#samples") for each in found.suspects]
         rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
     wrist = robot.masses.wrist
@@ -194,10 +196,16 @@ def _answer(robot: Robot, results: model.VisionResults) -> Answer:
 def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
     """An object: how surely it is grasped, or why it is not."""
     if each.grasp is None:
-        return ListRow("fail", each.name, refusal_text(each), "#objects", moment)
+        return ListRow("fail", each.name, refusal_text(each), f"#{each.name}", moment)
     sure = each.grasp.probability
-    note = tr("within tolerance: {percent} %", percent=fixed(100 * sure, 1))
-    return ListRow("pass", each.name, note, "#objects", moment, 1.0, [Part(sure, 1.0, "rest")])
+    note = tr("success: {percent} %", percent=fixed(100 * sure, 1))
+    return ListRow("pass", each.name, note, f"#{each.name}", moment, 1.0, [Part(sure, 1.0, "rest")])
+
+
+def _why_left_out(found: Finding) -> str:
+    """Why the calibration does not use a sample, in few words."""
+    kind = found.params.get("kind")
+    return joined([tr("left out"), word("vision.mending", MENDING, kind) if kind else ""], ": ")
 
 
 def _image_folder(study: Study, name: str) -> Path:
@@ -245,21 +253,13 @@ def _grasp(each: model.ObjectResult) -> list[str]:
     name = Markup("{}<br><small>{}</small>").format(each.name, own_title(each.note)) if each.note else each.name
     return [
         name,
-        tr("{grasp}, turned by {turn} deg", grasp=grasp.grasp, turn=fixed(grasp.turn_deg, 0)),
+        tr("{grasp}, turned by {turn}°", grasp=grasp.grasp, turn=fixed(grasp.turn_deg, 0)),
         f"{100 * grasp.probability:.1f} ± {196 * grasp.deviation:.1f} %",
         _listed(grasp.tool_xyz_mm),
         panel_link(grasp.q_before_deg, _listed(grasp.q_before_deg)),
         panel_link(grasp.q_deg, _listed(grasp.q_deg)),
         bracketed(near, say(grasp.nearest)) if grasp.nearest else near,
-        tr("straight") if not grasp.corners else tr("planned, {corners} corners", corners=grasp.corners),
         fixed(grasp.duration_s, 1),
         fixed(grasp.limit_margin_deg, 0),
         fixed(grasp.singular_value, 2),
     ]
-
-
-def _errors(each: model.ObjectResult) -> list[str]:
-    mm, deg = each.error_mm, each.error_deg
-    assert mm is not None
-    assert deg is not None
-    return [each.name, *(f"{fixed(getattr(mm, part), 2)} mm, {fixed(getattr(deg, part), 2)}°" for part in PARTS)]

@@ -296,36 +296,36 @@ def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> 
     }
     served = {
         "directions": tr(
-            "Task: a tray of {box} mm in which the tool reaches every point, with its axis anywhere within {cone} deg "
-            "of ({direction}) and the joints at least {margin} deg from their limits.",
+            "Task: a tray of {box} mm in which the tool reaches every point, with its axis anywhere within {cone}° "
+            "of ({direction}) and the joints at least {margin}° from their limits.",
             **shown,
         ),
         "tilts": tr(
-            "Task: a tray of {box} mm in which the tool reaches every point at every tilt within {cone} deg of "
-            "({direction}) that the arm's plane allows, with the joints at least {margin} deg from their limits.",
+            "Task: a tray of {box} mm in which the tool reaches every point at every tilt within {cone}° of "
+            "({direction}) that the arm's plane allows, with the joints at least {margin}° from their limits.",
             **shown,
         ),
         "turns": tr(
             "Task: a tray of {box} mm in which the tool reaches every point at some rotation about its axis; the axis "
-            "must lie within {cone} deg of ({direction}), where it always points. Revolute joints stay at least "
-            "{margin} deg from their limits.",
+            "must lie within {cone}° of ({direction}), where it always points. Revolute joints stay at least "
+            "{margin}° from their limits.",
             **shown,
         ),
         "points": tr(
             "Task: a tray of {box} mm in which the tool reaches every point in any orientation. Revolute joints stay "
-            "at least {margin} deg from their limits.",
+            "at least {margin}° from their limits.",
             **shown,
         ),
     }[capability.asked]
     lowest, clear = fixed(task.lowest_mm, 0), fixed(task.clear_of_axis_mm, 0)
     if capability.bar_m:
         stands = tr(
-            "The tray is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher.",
+            "The tray is level, as given or rotated by 90°, with its underside at {lowest} mm or higher.",
             lowest=lowest,
         )
     else:
         stands = tr(
-            "The tray is level, as given or rotated by 90 deg, with its underside at {lowest} mm or higher, at least "
+            "The tray is level, as given or rotated by 90°, with its underside at {lowest} mm or higher, at least "
             "{clear} mm from axis 1.",
             lowest=lowest,
             clear=clear,

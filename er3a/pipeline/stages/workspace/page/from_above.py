@@ -58,7 +58,7 @@ def from_above(
         words.append(_word(at, height, name, kind, size))
     gap = 2 * np.pi - (high - low)
     if gap > DEAD:
-        parts.append(Markup('<path class="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
+        parts.append(Markup('<path class="dead" id="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
         words.append(_word(0.85 * reach * _way(high + gap / 2), height, tr("dead zone"), "", size))
         for limit, aside in ((low, height), (high, -height)) if letters < FINE else ():
             named = f"J1 {fixed(np.degrees(limit), 0)}°"

@@ -47,7 +47,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         study,
         stored,
         output,
-        _answer(summary, placing, payload_key(known, robot), stored.rests_on.get("validation") == "unsettled"),
+        _answer(summary, placing, payload_key(known, robot)),
         at_side=placing,  # the plan of the tray
         plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
         labelled=_labelled(robot, results, scene, "wrong" if contradicted else "right"),
@@ -67,15 +67,12 @@ def _labelled(robot: Robot, results: model.WorkspaceResults, scene: Scene | None
     return workspace_figures.labelled(robot, results, floor_mm, kind)
 
 
-def _answer(
-    summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str], unsettled: bool
-) -> Answer:
-    """How far the arm reaches, its voids, where the tray goes, and the ``payload``; ``unsettled``: whether documents
-    settle nothing of the table that all this holds for."""
+def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str]) -> Answer:
+    """How far the arm reaches, its voids, where the tray goes, and the ``payload``."""
     reach, volume = summary.reach_m, summary.volume_m3
-    enclosed = summary.enclosed_voids
-    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in enclosed), "L"), "L")
-    rest = tr("Void ≥ {size}.", size=litres) if enclosed else tr("No enclosed void.")
+    rest, best = "", placing.tried[0] if placing else None
+    if placing and best and not sum(map(len, placing.hindered(best).values())):
+        rest = whole_sentence(tr("{tray} fits", tray=best.tray.name))
     keys = [
         (
             tr("{low} to {high} mm", low=millimetres([reach.lowest]), high=millimetres([reach.highest])),
@@ -83,29 +80,26 @@ def _answer(
         ),
         (
             with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
-            tr("± {half} m³, proven for this table", half=fixed((volume.upper - volume.lower) / 2, 2)),
+            tr("± {half} m³, proven", half=fixed((volume.upper - volume.lower) / 2, 2)),
         ),
         payload,
     ]
-    # The void that the headline names and the picture shows comes first.
+    # The void that the picture shows comes first.
     voids = sorted(enumerate(summary.voids, start=1), key=lambda each: each[1].kind != "enclosed")
     groups = (
-        Group(tr("Voids"), [_void_as_row(*each) for each in voids]),
+        Group(tr("Voids"), [_void_as_row(*each, bool(placing)) for each in voids]),
         Group(tr("Where the tray goes"), _tray_as_rows(placing)),
     )
-    reach_text = reaches(summary)
-    if unsettled:
-        reach_text = tr("{reach} with this table", reach=reach_text)
-    return Answer(whole_sentence(reach_text), rest, tr("Distances are from axis 1."), keys, groups)
+    return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups)
 
 
-def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
-    """A void: what kind, how large."""
+def _void_as_row(number_: int, void: model.VoidSummary, planned: bool) -> ListRow:
+    """A void: what kind, how large; ``planned``: whether there is a view from above."""
     size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
     of_one = {joint for limit in void.cause.params.get("limits", ()) for joint in limit.joints} == {1}
     where = tr("at the shoulder: normal") if void.holds_shoulder else tr("in the dead zone") if of_one else ""
     note = joined([with_unit(size, "L"), where], ", ")
-    address = f"#hole-{number_}" if void.kind == "enclosed" else f"#void-{number_}"
+    address = f"#hole-{number_}" if void.kind == "enclosed" else "#dead" if of_one and planned else f"#void-{number_}"
     return ListRow("none", tr(workspace_figures.VOID_NAMES[void.kind], number=number_), note, address)
 
 

@@ -410,7 +410,7 @@ def compared_with_tray(met_it: Collection[str] | None) -> str:
         else tr("Neither the tool point nor a link's shape nor what is carried was found in the tray or its stand.")
     )
     how = tr(
-        "Compared at the stored times and every {turn:.1f} deg or {way:.0f} mm of a joint between them.",
+        "Compared at the stored times and every {turn:.1f}° or {way:.0f} mm of a joint between them.",
         turn=np.degrees(STEP),
         way=1000 * STEP,
     )
