@@ -21,8 +21,10 @@ import jinja2
 from markupsafe import Markup
 
 from er3a.errors import ResultError
-from er3a.files.kept_files import INSTALLED, ROOT, from_here, view_command, write_text
+from er3a.files.kept_files import INSTALLED, ROOT, from_here, view_command, write_atomically, write_text
+from er3a.numerics.jit import cache_folder
 from er3a.pipeline import language
+from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.numbers import (
     at_least,
@@ -365,18 +367,25 @@ def render(
             **context,
         )
     )
-    html = closed_up(html) if language.current() == "zh" else DEGREES.sub(lambda found: found[1] or "°", html)
+    html = closed_up(html) if language.current() == "zh" else DEGREES.sub(_sign_or_code, html)
     write_text(output, html)
 
 
-class _Compiled(dict[str, bytes]):
-    """Templates that this process has compiled, by what jinja calls them: each page has an environment of its own, but
-    most of it is what all pages share."""
-
-    set = dict.__setitem__
+def _sign_or_code(found: re.Match[str]) -> str:
+    return found[0] if found[0].startswith("<") else "°"
 
 
-_COMPILED = _Compiled()
+class _Compiled:
+    """Templates that were compiled on this machine, by what jinja calls them: those of a robot take a second. Where a
+    file can't be read or written, jinja compiles again."""
+
+    folder = cache_folder() / f"templates-{code_digest()[:16]}"
+
+    def get(self, name: str) -> bytes:
+        return (self.folder / name).read_bytes()
+
+    def set(self, name: str, code: bytes) -> None:
+        write_atomically(self.folder / name, partial(Path.write_bytes, data=code))
 
 
 def page_environment(*folders: Path) -> jinja2.Environment:
@@ -397,8 +406,8 @@ def page_environment(*folders: Path) -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         extensions=["jinja2.ext.i18n"],
-        # By language: what a filter makes of a constant is compiled in.
-        bytecode_cache=jinja2.MemcachedBytecodeCache(_COMPILED, prefix=language.current()),  # type: ignore[arg-type]
+        # By language and digest of the code: what a filter makes of a constant is compiled in.
+        bytecode_cache=jinja2.MemcachedBytecodeCache(_Compiled(), prefix=language.current()),
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True
@@ -483,7 +492,10 @@ def _tray_edges(study: Study, stored: Stored[Any]) -> str:
 
 
 # "deg" in sentences that the command line says, too: pages have one sign for it; a file's own words stay.
-DEGREES = re.compile(r"(<code>[^<]*</code>)|(?<=[\d)])[ \u00a0]deg\b|(?<=[(> \u00a0])deg\b(?=[/)²³<;,. ])")
+# Each alternative begins with a letter of its own, by which the search skips most of a page.
+DEGREES = re.compile(
+    r"<code>[^<]*</code>| (?<=[\d)] )deg\b|\u00a0(?<=[\d)]\u00a0)deg\b|deg\b(?<=[(> \u00a0]deg)(?=[/)²³<;,. ])"
+)
 BRACKETS = re.compile(r"(?<=>)(?<!<code>)([^<>()]{1,40}) \(([^<>()]{1,20})\)(?=</t[hd]>)")
 STOPS = re.compile(r"(</(?:a|code|em|strong)>)\.(?=[\s<])")
 BLANKS = re.compile(
