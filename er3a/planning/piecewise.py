@@ -137,9 +137,7 @@ class Pieces:
         ends = np.nan_to_num(np.stack([chebyshev.chebval(x, self.series.T) for x in (-1.0, 1.0)]), nan=-np.inf)
         side, piece = np.unravel_index(int(ends.argmax()), ends.shape)
         most, at = float(ends.max()), float(self.times[piece + side])
-        for i in np.argsort(-self.range[1], kind="stable").tolist():
-            if not self.range[1][i] > most:
-                break
+        for i in np.flatnonzero(self.range[1] > most).tolist():
             t, values = self.nodes(i)
             if values.max() > most:
                 most, at = float(values.max()), float(t[values.argmax()])

@@ -21,10 +21,8 @@ import jinja2
 from markupsafe import Markup
 
 from er3a.errors import ResultError
-from er3a.files.kept_files import INSTALLED, ROOT, from_here, view_command, write_atomically, write_text
-from er3a.numerics.jit import cache_folder
+from er3a.files.kept_files import INSTALLED, ROOT, from_here, view_command, write_text
 from er3a.pipeline import language
-from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.numbers import (
     at_least,
@@ -367,25 +365,22 @@ def render(
             **context,
         )
     )
-    html = closed_up(html) if language.current() == "zh" else DEGREES.sub(_sign_or_code, html)
+    html = (
+        closed_up(html)
+        if language.current() == "zh"
+        else DEGREES.sub(lambda found: found[0] if found[0][0] == "<" else "°", html)
+    )
     write_text(output, html)
 
 
-def _sign_or_code(found: re.Match[str]) -> str:
-    return found[0] if found[0].startswith("<") else "°"
+class _Compiled(dict[str, bytes]):
+    """Templates that this process has compiled, by what jinja calls them: each page has an environment of its own, but
+    most of it is what all pages share."""
+
+    set = dict.__setitem__
 
 
-class _Compiled:
-    """Templates that were compiled on this machine, by what jinja calls them: those of a robot take a second. Where a
-    file can't be read or written, jinja compiles again."""
-
-    folder = cache_folder() / f"templates-{code_digest()[:16]}"
-
-    def get(self, name: str) -> bytes:
-        return (self.folder / name).read_bytes()
-
-    def set(self, name: str, code: bytes) -> None:
-        write_atomically(self.folder / name, partial(Path.write_bytes, data=code))
+_COMPILED = _Compiled()
 
 
 def page_environment(*folders: Path) -> jinja2.Environment:
@@ -406,8 +401,8 @@ def page_environment(*folders: Path) -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         extensions=["jinja2.ext.i18n"],
-        # By language and digest of the code: what a filter makes of a constant is compiled in.
-        bytecode_cache=jinja2.MemcachedBytecodeCache(_Compiled(), prefix=language.current()),
+        # By language: what a filter makes of a constant is compiled in.
+        bytecode_cache=jinja2.MemcachedBytecodeCache(_COMPILED, prefix=language.current()),  # type: ignore[arg-type]
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True
