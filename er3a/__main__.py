@@ -15,7 +15,7 @@ FEW_POSES = {"arms", "compare"}
 
 def main() -> None:
     """The command line."""
-    gc.set_threshold(50_000)  # loading makes many objects, none of them garbage: looking for some took a tenth of it
+    gc.set_threshold(500_000)  # work makes many objects, few of them garbage: looking for some took a tenth of it
     distrust()
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # many small matrices: threads of BLAS only wait
         os.environ.setdefault(name, "1")

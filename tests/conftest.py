@@ -55,6 +55,7 @@ FIRST_FILES = (  # these compile most kernels, either other ones: one process ea
     "kinematics/test_by_class.py",
     "comparison/test_compare.py",
     "integration/test_offices.py",
+    "collision/test_meshes.py",  # else beside test_surfaces.py, each compiling the same
 )
 ROOMS_OF_COLLISIONS = ("program_check", "programs", "robots", "stages", "vision", "workspace", "planning", "collision")
 ROOT = Path(__file__).resolve().parents[1]

@@ -111,9 +111,8 @@ class ArmModel:
         M : (N, n, n), kg m^2 (kg m and kg with prismatic joints), symmetric
         """
         pin, data = pinocchio(), self.model.createData()
-        upper = [np.triu(pin.crba(self.model, data, x)) for x in self._x(q)]
-        M = np.array(upper).reshape(-1, self.robot.rows, self.robot.rows)
-        M = M + np.swapaxes(np.triu(M, 1), 1, 2)
+        M = np.array([pin.crba(self.model, data, x) for x in self._x(q)]).reshape(-1, self.robot.rows, self.robot.rows)
+        M = np.triu(M) + np.swapaxes(np.triu(M, 1), 1, 2)
         found: Reals = self.to_rows.T @ M @ self.to_rows
         return found
 

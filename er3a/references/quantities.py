@@ -35,7 +35,6 @@ Extremity = Literal["greatest", "least"]
 ZERO_POSE: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 MM = 1000.0
 SIX = 6  # rows of an arm with a wrist centre
-SECTION_AXES: tuple[SectionAxis, ...] = ("x", "z")
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
 FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": -1}
 
@@ -366,7 +365,7 @@ class SectionCoordinate(QuantityAtPose):
         -------
         coordinate : (...), mm, x from axis 1 or z from axis 2; its size if unsigned
         """
-        value = section_of(state.at(self.pose))[..., 0 if self.coordinate == "x" else 1]
+        value = section_coordinate(state.at(self.pose), "wrist_centre", self.coordinate) * MM
         return np.abs(value) if self.unsigned else value
 
     @property
@@ -692,21 +691,6 @@ def point_of(T: Reals, point: Point) -> Reals:
     position : (..., 3), mm, base frame
     """
     return T[..., FRAME_OF_POINT[point], :3, 3] * MM
-
-
-def section_of(T: Reals) -> Reals:
-    """The wrist centre in the side view.
-
-    Parameters
-    ----------
-    T : (..., m + 1, 4, 4), base frame, m
-
-    Returns
-    -------
-    section : (..., 2), mm, x from axis 1 and z from axis 2
-    """
-    parts = [section_coordinate(T, "wrist_centre", coordinate) for coordinate in SECTION_AXES]
-    return np.stack(parts, axis=-1) * MM
 
 
 def nearest_on_line(direction: Reals, on_line: Reals, point: Reals) -> Reals:

@@ -149,7 +149,7 @@ def manipulability_of(robot: Robot, q: Reals, within: Flags) -> Reals:
     Parameters
     ----------
     q : (..., n), rad or m
-    within : (...), where joint values are not within the limits, the result may be 0
+    within : (...), where joint values are not within the limits, the result is 0: of maps most slots are empty
 
     Returns
     -------
@@ -157,7 +157,9 @@ def manipulability_of(robot: Robot, q: Reals, within: Flags) -> Reals:
     """
     if wrist_partition_missing(robot) or robot.coupling is not None:
         return generic_manipulability(robot, q, within)
-    return manipulability(constants_for_blocks(robot), robot.direction * q + robot.offset)
+    found = np.zeros(within.shape)
+    found[within] = manipulability(constants_for_blocks(robot), robot.direction * q[within] + robot.offset)
+    return found
 
 
 def manipulability(arm: BlockConstants, theta: Reals) -> Reals:

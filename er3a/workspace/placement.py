@@ -388,7 +388,8 @@ def serve(
             tried = direction if len(direction) == 1 else direction[part]
             q_all, within = all_solutions(asked, directions.poses(points[part][:, None], tried).reshape(-1, 4, 4))
             value = np.where(within, manipulability_of(robot, q_all, within), NO).reshape(len(part), -1, slots)
-            inside = _limit_margin(asked, q_all)
+            inside = np.full(within.shape, np.inf)
+            inside[within] = _limit_margin(asked, q_all[within])
             rolled = _best_roll(
                 value, q_all.reshape(*value.shape, -1), free, (manipulability[part] <= NO, manipulability_any[part])
             )[:, None]

@@ -117,6 +117,11 @@ def test_what_can_not_be_followed_is_told_with_the_time():
     through[0, 3] = -0.5  # through axis 1, where the inner arm would have to turn at once
     with pytest.raises(PathEndsError):
         follow_by_class(SCARA, line(T, through, 1.0))
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_an_arm_of_no_class_that_follows_is_refused():
+    T = np.eye(4)
     panda = ([0, 0, 0.0825, -0.0825, 0, 0.088, 0], [-H, H, H, -H, H, H, 0], [0.333, 0, 0.316, 0, 0.384, 0, 0.107])
     with pytest.raises(NotWristPartitionedError):
         follow_by_class(arm(panda), line(T, T, 1.0))

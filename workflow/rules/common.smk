@@ -104,15 +104,16 @@ def results_of(robot, stage):
     return [f"results/{robot}/{stage}/{name}" for name in ("summary.json", "SHA256SUMS")]
 
 
-ALONE = ("validation", "workspace")  # each takes as long as all others together
+OF_MODEL = ("validation", "workspace")  # together they take as long as all others together
 
 
 def jobs_of(robot):
-    """The stages of a robot by the job that computes them: all but the longest share one, as each would take longer to
-    start than to work."""
+    """The stages of a robot by the name of the job that computes them: two that take about as long, as a process takes
+    two seconds to start."""
     stages = STUDY.stages(robot)
-    shared = [stage for stage in stages if stage not in ALONE]
-    return [*([stage] for stage in stages if stage in ALONE), *([shared] if shared else [])]
+    jobs = {"model": [stage for stage in stages if stage in OF_MODEL]}
+    jobs["others"] = [stage for stage in stages if stage not in OF_MODEL]
+    return jobs
 
 
 def asked_stages(robot):

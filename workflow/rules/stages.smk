@@ -2,20 +2,20 @@
 
 
 for robot in ROBOTS:
-    for stages in jobs_of(robot):
+    for job, stages in jobs_of(robot).items():
         asked = [stage for stage in stages if stage in ASKED]
         if asked:
 
             rule:
                 name:
-                    f"compute_{robot}_{stages[0] if stages[0] in ALONE else 'others'}"
+                    f"compute_{robot}_{job}"
                 input:
                     list(dict.fromkeys(path for stage in stages for path in inputs(robot, stage))),
                 output:
                     [update(path) for stage in asked for path in results_of(robot, stage)],
                 log:
-                    f"logs/{robot}/{stages[0] if stages[0] in ALONE else 'others'}.compute.log",
-                priority: {"validation": 3, "workspace": 2}.get(stages[0], 1)  # what takes longest starts first
+                    f"logs/{robot}/{job}.compute.log",
+                priority: 2 if job == "model" else 1  # most robots have no more than that
                 conda:
                     "../envs/er3a.yaml"
                 resources:

@@ -565,4 +565,4 @@ def places(found: Places) -> BoxPlaces:
 
 def _arcs(rows: Reals) -> list[list[float]]:
     """Arcs (n, arcs, 2), rad, unused ones NaN, as lists of their ends in deg."""
-    return [np.degrees(row[np.isfinite(row[:, 0])]).ravel().tolist() for row in rows]
+    return [row[np.isfinite(row)].tolist() for row in np.degrees(rows).reshape(len(rows), -1)]
