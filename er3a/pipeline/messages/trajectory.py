@@ -355,7 +355,7 @@ def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
     if tried.name in BY_JOINTS and swings:
         joint = max(swings, key=swings.__getitem__)
         tool = joined([tool, sentence("advice.swing", joint=joint, swing=swings[joint])])
-    clearance = None if motion.clearance_mm is None else math.floor(10 * motion.clearance_mm) / 10
+    clearance = math.floor(10 * motion.clearance.least_mm) / 10 if motion.clearance else None
     way = strategy_word(tried.name)
     if slowed:
         percent = math.floor(100 * slowed.part)

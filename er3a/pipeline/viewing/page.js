@@ -302,6 +302,16 @@ function answerPointer(image, linesAt) {
   addEventListener("scroll", () => (box.hidden = true), { passive: true, capture: true });
 }
 
+// The address keeps what a reader chose, so that a reload, the way back and a link lead to it; what is empty goes.
+function keepInAddress(queries, place) {
+  const address = new URL(location.href);
+  for (const [name, value] of Object.entries(queries)) value ? address.searchParams.set(name, value) : address.searchParams.delete(name);
+  if (place) address.hash = encodeURIComponent(place);
+  history.replaceState(history.state, "", address);
+}
+
+const MOMENT = { play: "", t: "", until: "" }; // of another choice, which an address may name
+
 const MANY_ROWS = 12;
 
 // A field that leaves the rows in which its words stand. The address keeps them, as "?2=words" for the page's third table.
@@ -327,10 +337,7 @@ function filterFor(table) {
   box.append(field, count);
   field.addEventListener("input", () => {
     filter();
-    const address = new URL(location.href);
-    if (field.value) address.searchParams.set(number, field.value);
-    else address.searchParams.delete(number);
-    history.replaceState(null, "", address);
+    keepInAddress({ [number]: field.value });
   });
   if (field.value) {
     unfold(table); // first: Chromium leaves room for nothing in a fold that is opened after its rows were measured
@@ -438,11 +445,7 @@ function addFinder() {
   const findAnywhere = () => (places ? find() : loadPlaces().then(find));
   field.addEventListener("input", () => {
     findAnywhere();
-    const address = new URL(location.href);
-    address.searchParams.delete("at");
-    if (field.value) address.searchParams.set("find", field.value);
-    else address.searchParams.delete("find");
-    history.replaceState(null, "", address);
+    keepInAddress({ find: field.value, at: "" });
   });
   addEventListener("keydown", (event) => {
     const busy = event.target.closest?.("input, select, textarea, canvas, [contenteditable]");
@@ -451,10 +454,10 @@ function addFinder() {
     field.focus();
   });
   addEventListener("hashchange", () => {
-    if (!document.getElementById(decodeURIComponent(location.hash.slice(1)))?.closest(".unfound")) return;
+    if (!document.getElementById(addressed())?.closest(".unfound")) return;
     field.value = "";
     field.dispatchEvent(new Event("input"));
-    document.getElementById(decodeURIComponent(location.hash.slice(1))).scrollIntoView();
+    document.getElementById(addressed()).scrollIntoView();
   });
   if (!field.value) return;
   findAnywhere();
@@ -524,7 +527,7 @@ function goToPlace(main, showAll) {
   if (part) {
     showAll();
     part.dispatchEvent(new Event("beforematch"));
-    history.replaceState(null, "", `#${part.querySelector("h2").id}`); // the player takes it up
+    keepInAddress({}, part.querySelector("h2").id); // the player takes it up
     unfold(place);
   }
   place.classList.add("sought");
@@ -561,45 +564,48 @@ function linkJoints(page) {
   }
 }
 
-// Of parts that are alike, one at a time: picked by list, a link or the browser's search. A sheet of paper has all.
+// What the address names: a place on the page, or a motion.
+const addressed = () => decodeURIComponent(location.hash.slice(1));
+
+// Of parts that are alike, one at a time: picked by list, a link, the browser's search, or by the motion that is shown. A
+// sheet of paper has all.
 function showOneOf(group) {
   const parts = [...group.children];
   if (parts.length < 2) return;
-  const idOf = (part) => part.querySelector("h2").id;
-  const motionOf = (part) => idOf(part).replace(/-(solutions|clearance)$/, "");
+  const motionOf = (part) => part.querySelector("h2").dataset.motion ?? part.querySelector("h2").id.replace(/-(solutions|clearance)$/, "");
   const chooser = document.createElement("select");
-  chooser.append(...parts.map((part) => new Option(motionOf(part), idOf(part))));
-  const choose = (part) => {
-    chooser.value = idOf(part);
+  chooser.append(...parts.map((part) => new Option(motionOf(part))));
+  const show = (part) => {
+    chooser.value = motionOf(part);
     for (const other of parts) other === part ? other.removeAttribute("hidden") : other.setAttribute("hidden", "until-found");
     dispatchEvent(new Event("resize")); // for what takes its size from a part that was not there
-    dispatchEvent(new CustomEvent("chosen", { detail: chooser.value }));
+  };
+  const choose = (part) => {
+    show(part);
+    dispatchEvent(new CustomEvent("chosen", { detail: motionOf(part) }));
   };
   const label = document.createElement("label");
   label.className = "pickers";
   label.append(`${group.dataset.oneOf} `, chooser);
   group.before(label);
-  chooser.addEventListener("change", () => {
-    choose(parts[chooser.selectedIndex]);
-    history.replaceState(null, "", `#${encodeURIComponent(chooser.value)}`);
-  });
+  chooser.addEventListener("change", () => choose(parts[chooser.selectedIndex]));
   for (const part of parts) part.addEventListener("beforematch", () => choose(part));
   const follow = () => {
-    const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const aim = document.getElementById(addressed());
     const part = aim && parts.find((each) => each.contains(aim));
     if (!part) return;
     choose(part);
     aim.scrollIntoView();
   };
   addEventListener("hashchange", follow);
-  addEventListener("picked", ({ detail }) => parts.filter((part) => motionOf(part) === detail).forEach((part) => choose(part)));
-  choose(parts[0]);
+  addEventListener("motion", ({ detail }) => parts.filter((part) => motionOf(part) === detail).forEach(show));
+  show(parts[0]);
   follow();
 }
 
 // What an address leads to may be folded, or inside of what is.
 function unfoldTarget() {
-  const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  const aim = document.getElementById(addressed());
   if (!aim?.closest("details:not([open])")) return;
   unfold(aim);
   aim.scrollIntoView();
@@ -762,17 +768,19 @@ const mark = (shown) => {
   if (instead) link.href = instead;
   link.hidden = !instead || (link.hash === shown.hash && !instead.includes("?")); // nothing else is there to be shown
 };
-const pick = (row, name = decodeURIComponent(row.hash.slice(1))) => {
+// A row's own name; several may show one motion, each another moment of it.
+const nameOf = (row) => row.querySelector("b").textContent;
+const other = (row) => new URLSearchParams(row.dataset.instead?.split(/[?#]/)[1]).get("play"); // that it leads to instead
+const playing = (name) => rows.find((row) => row.dataset.play === name) ?? rows.find((row) => name && other(row) === name);
+const choose = (row, name) => {
   mark(row);
-  dispatchEvent(new CustomEvent("picked", { detail: name }));
+  keepInAddress(MOMENT, name);
 };
-for (const row of rows) row.addEventListener("click", () => pick(row));
-const played = new URLSearchParams(location.search).get("play");
-const playing = (name) => rows.find((row) => name && row.dataset.play === name);
-document.querySelector(".player .motion")?.addEventListener("change", ({ target }) => pick(playing(target.value), target.value));
-const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];
-mark(first);
-if (first && (location.hash.length < 2 || first.hash === location.hash)) pick(first);
+for (const row of rows) row.addEventListener("click", () => (row.dataset.play ? choose(row, nameOf(row)) : mark(row)));
+const named = addressed();
+mark(playing(new URLSearchParams(location.search).get("play")) ?? rows.find((row) => nameOf(row) === named || row.hash === location.hash) ?? playing(named || document.querySelector(".player")?.dataset.opened) ?? rows[0]);
+const follow = ({ detail }) => rows.some((row) => row.ariaCurrent && row.dataset.play === detail) || choose(playing(detail), detail);
+addEventListener("player", () => addEventListener("motion", follow)); // the first one is not of the reader's choice
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");

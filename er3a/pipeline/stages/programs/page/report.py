@@ -56,10 +56,10 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         programs_answer(robot, results),
         sections=sections,
-        entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
+        entered=None if stored.contradicted else in_tray(study, stored),
         compared_with_tray=compared_with_tray,
         faults={fault.name: fault for fault in wrong},
-        player=player(robot, played, scene, opened=opened(wrong)),
+        player=player(robot, played, scene, opened=opened(wrong), judged=not stored.contradicted),
         bodies=[each.name for each in scene.solids] if scene else [],
         drawing_head=drawing_head(),
     )

@@ -294,7 +294,7 @@ def _near_events(path: model.PathSummary, near: Finding | None, clearance: model
     """From when to when a path is as near to assumed shapes as these may be wrong, at its nearest."""
     if near is None or path.clearance is None:
         return []
-    rows = clearance.take(clearance.path == path.name)
+    rows = clearance.take((clearance.path == path.name) & (clearance.strategy == ""))
     at = path.clearance.t_s
     far = rows.t_s[~(rows.clearance_mm < near.margin_mm)]
     start = min(rows.t_s[rows.t_s > max(far[far < at], default=-np.inf)], default=at)

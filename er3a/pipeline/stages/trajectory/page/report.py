@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from er3a.collision.pairs import Pair
 from er3a.pipeline.language import tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
@@ -58,19 +57,18 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     scene = study.scene(stored.robot, stored.stage)
     sections = []
     count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
-    paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
+    paths, contradicted = worst_first(summary.paths), stored.contradicted
     lines = program_head(stored.validated, summary.checked, summary.assumed)
     met = None if contradicted else met_in_tray(study, stored)
-    wrong = _by_name(results)
+    wrong = {} if contradicted else _by_name(results)
     trays = {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in (met or {}).items()}
     played = motions(robot, results, trays)
-    for i, path in enumerate(paths):
+    for i, path in enumerate(() if contradicted else paths):
         rows = checks.take(checks.path == path.name)
-        files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
+        files = results.programs.take((results.programs.path == path.name) & (i < count))
         links = _programs(path, files, lines, met or {})
         drawn = _figure(robot, path, rows, summary.near) if i < count else None
-        measured = results.clearance.take(results.clearance.path == path.name)
-        nearness = nearness_picture(path, measured, summary.verdict.shapes) if i < count and path.clearance else None
+        nearness = _nearness(path, results) if i < count else []
         sections.append({**_section(path, drawn, links, summary), "near_over_time": nearness})
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
@@ -84,9 +82,8 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         faults=wrong,
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
-        contradicted=contradicted,
         drawn_paths=count,
-        player=player(robot, played, scene, opened=opened(wrong.values())),
+        player=player(robot, played, scene, opened=opened(wrong.values()), judged=not contradicted),
         drawing_head=drawing_head(),
     )
 
@@ -215,6 +212,20 @@ def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks, near:
     return path_picture(robot, path, _drawn(path, rows), near, alt, whole_sentence(text))
 
 
+def _nearness(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, str, Picture]]:
+    """Of a path, and of the motion that repairs it: address, name, and how near it comes over time."""
+    rows, shapes = results.clearance.take(results.clearance.path == path.name), results.summary.verdict.shapes
+    found, motion = [], path.chosen and path.chosen.motion
+    if path.clearance:
+        picture = nearness_picture(path.name, path.clearance, rows.take(rows.strategy == ""), shapes, path)
+        found.append((path.name, path.name, picture))
+    if motion and motion.clearance:
+        own = rows.take(rows.strategy == path.strategy)
+        picture = nearness_picture(repaired(path), motion.clearance, own, shapes)
+        found.append((f"{path.name}-repaired", repaired(path), picture))
+    return found
+
+
 def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
     """The rows that a curve needs: evenly spread ones, those at singular poses, and the maximum speeds."""
     even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
@@ -228,7 +239,6 @@ def strategies_shown(path: model.PathSummary) -> list[list[str]]:
     """Rows of the comparison: the programme, and each strategy."""
     if not path.avoidance:
         return []
-    clearance = _clearance(path.clearance.least_mm, path.clearance.between) if path.clearance else "–"
     rows = [
         [
             tr("as programmed"),
@@ -236,7 +246,7 @@ def strategies_shown(path: model.PathSummary) -> list[list[str]]:
             "0.00",
             _ratio(path.max_joint_speed_ratio),
             _ratio(path.max_joint_acceleration_ratio),
-            clearance,
+            _clearance(path.clearance),
             fixed(path.duration_s, 2),
             tr("the path to be repaired"),
         ]
@@ -256,13 +266,13 @@ def _costs(motion: model.StrategyMotion) -> list[str]:
         fixed(motion.max_deviation_deg, 2),
         _ratio(motion.max_joint_speed_ratio),
         _ratio(motion.max_joint_acceleration_ratio),
-        _clearance(motion.clearance_mm, motion.clearance_between),
+        _clearance(motion.clearance),
         fixed(motion.duration_s, 2),
     ]
 
 
-def _clearance(value: float | None, pair: Pair | None) -> str:
-    return "–" if value is None or pair is None else bracketed(fixed(value, 0), say(pair))
+def _clearance(found: model.MinClearance | None) -> str:
+    return bracketed(fixed(found.least_mm, 0), say(found.between)) if found else "–"
 
 
 def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:

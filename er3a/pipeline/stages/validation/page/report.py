@@ -40,6 +40,7 @@ from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
     text_address,
+    use_table,
 )
 from er3a.pipeline.viewing.side_view import (
     COLUMN,
@@ -267,10 +268,7 @@ def _answer(
         if unsure and not bad:
             below = tr("A check that other values would pass as well settles no entry.")
     if instead:
-        fix = Fix(
-            tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),
-            f"../{instead}/validation.html",
-        )
+        fix = use_table(study, instead, "validation")
     elif disputed:
         stated = joined([fixed(each.expected, 1) for each in disputed[0].statements], " or ")
         fix = Fix(
