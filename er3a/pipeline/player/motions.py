@@ -202,5 +202,5 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
             text = re.sub(
                 r"(?<=\d) (?=(mm|s|deg|%))", "\u00a0", first_sentence(fault.to_do)[0]
             )  # units stay with values
-            return Fix(joined((fault.name, text), ": "), place, fault.status != "caution")
+            return Fix(text, place, fault.status != "caution")
     return None

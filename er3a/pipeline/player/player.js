@@ -184,7 +184,8 @@ function nameEnds(trail) {
   const [first, last] = [trail[0], trail.at(-1)];
   if (trail.every((point) => Math.hypot(...subtract(point, first)) < CLOSED * data.size)) return; // at rest
   const closed = Math.hypot(...subtract(last, first)) < CLOSED * data.size;
-  for (const [at, text] of closed ? [[first, words.start_and_end]] : [[first, words.start], [last, words.end]]) {
+  const arrives = whole() - end() < ROUNDED;
+  for (const [at, text] of closed ? [[first, words.start_and_end]] : [[first, words.start], ...(arrives ? [[last, words.end]] : [])]) {
     space.dot(at, space.page.ink, 4);
     space.word(text, at, space.page.ink, false);
   }
@@ -194,7 +195,7 @@ function nameEnds(trail) {
 function tell() {
   if (bar.dataset.motion !== motion.name) newMotion();
   bar.value = String(t);
-  const [at, last, said] = motion.ghosts.length > 1 ? [String(Math.floor(t) + 1), String(motion.events.length), words.solution] : [fixed(t), fixed(end()), words.clock];
+  const [at, last, said] = motion.ghosts.length > 1 ? [String(Math.floor(t) + 1), String(motion.events.length), words.solution] : [fixed(t), fixed(whole()), words.clock];
   clock.textContent = said.replace("{t}", at).replace("{end}", last);
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));

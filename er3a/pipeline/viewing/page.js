@@ -534,13 +534,6 @@ function goToPlace(main, showAll) {
   place.scrollIntoView({ block: "center" });
 }
 
-// A table that goes on beyond its right edge fades there.
-function fade(box) {
-  const tell = () => box.classList.toggle("more", box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
-  box.addEventListener("scroll", tell, { passive: true });
-  new ResizeObserver(tell).observe(box);
-}
-
 // Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg" or "(10°, −20°, 300 mm, 0°)", lead to the arm in the
 // teach panel.
 function linkJoints(page) {
@@ -687,7 +680,6 @@ addEventListener("hashchange", unfoldTarget);
 unfoldTarget();
 document.querySelectorAll("[data-one-of]").forEach(showOneOf);
 explainTerms(JSON.parse(document.getElementById("terms").textContent));
-document.querySelectorAll(".scroll").forEach(fade);
 
 // A sheet of paper can't be unfolded.
 addEventListener("beforeprint", () => document.querySelectorAll("details.section").forEach((details) => (details.open = true)));
@@ -760,10 +752,10 @@ const rows = [...document.querySelectorAll(".runs:not(.plain) a")];
 const fix = rows.some((row) => row.dataset.fix) && document.querySelector(".hero .fix"); // it follows the row
 const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
-  if (!fix || fix.toggleAttribute("hidden", !shown)) return;
-  const { lead, fix: advice, instead } = shown.dataset; // without advice it says what the row does: the list stays in its place
-  fix.querySelector("b").textContent = lead ?? shown.querySelector("b").textContent;
-  fix.querySelector("span").lastChild.data = ` ${advice ?? shown.querySelector("small").textContent}`;
+  if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
+  const { lead, fix: advice, instead } = shown.dataset;
+  fix.querySelector("b").textContent = lead;
+  fix.querySelector("span").lastChild.data = ` ${advice}`;
   const link = fix.querySelector("a");
   if (instead) link.href = instead;
   link.hidden = !instead || (link.hash === shown.hash && !instead.includes("?")); // nothing else is there to be shown

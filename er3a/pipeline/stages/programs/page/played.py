@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import defaultdict
+from dataclasses import replace
+from itertools import chain
 from operator import itemgetter
 from pathlib import Path
 
@@ -15,7 +17,7 @@ from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import times_needed
-from er3a.pipeline.messages.programs import rates_text, remedies, singular_cause
+from er3a.pipeline.messages.programs import rates_text, remedies, singular_cause, told_of_passes
 from er3a.pipeline.messages.say import joined, say, say_first
 from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of, at_rest
 from er3a.pipeline.stages.expectations import is_met
@@ -36,7 +38,7 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     too fast together, bodies that touch each from its own. ``q`` is (N, n), rad or m.
     """
     motions = []
-    for program in worst_first(results.summary.programs):
+    for program in worst_first(results):
         rows = results.motion.take(results.motion.program == program.name)
         events = [PlayedEvent(t0, t1, tr("line {line}", line=line), "plain") for line, _, t0, t1 in stretches(rows)]
         for each in sorted(program.findings, key=cause_first):
@@ -107,8 +109,20 @@ def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
     )
 
 
-def worst_first(programs: Sequence[ProgramSummary]) -> list[ProgramSummary]:
-    """Those that fail first, of them those that were not expected to."""
+def worst_first(results: ProgramsResults) -> list[ProgramSummary]:
+    """Programs with what was found: those that fail first, of them those that were not expected to."""
+    programs = []
+    for program in results.summary.programs:
+        rows = results.instructions.take(results.instructions.program == program.name)
+        places: dict[tuple[str, int], list[FindingAt]] = defaultdict(list)
+        for each in program.findings:
+            places[each.file, each.line].append(each)
+        own = Path(program.file).name
+        found = (
+            told_of_passes(here, int(rows.times[(rows.line == line) & (file == own)].sum()))
+            for (file, line), here in places.items()
+        )
+        programs.append(replace(program, findings=tuple(chain(*found))))
     return sorted(programs, key=lambda each: (-RANKS[each.outcome], is_met(each)))
 
 
@@ -116,7 +130,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
     """The programs that may not be run as they are, the worst first: of each the first finding of the gravest level,
     and what comes before it."""
     found = []
-    for program in worst_first(results.summary.programs):
+    for program in worst_first(results):
         wrong = sorted((each for each in program.findings if WEIGHTS[each.level] != "plain"), key=moment_of)
         if not wrong or program.outcome == "pass":
             continue
@@ -133,19 +147,12 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 is_met(program),
                 as_expected(program),
                 moments,
-                " ".join(dict.fromkeys(text for each in shown for text in _advice(results, program, each)[:1])),
+                " ".join(dict.fromkeys(text for each in shown for text in remedies(_same_line(program, each))[:1])),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
                 cause=cause,
             )
         )
     return found
-
-
-def _advice(results: ProgramsResults, program: ProgramSummary, found: FindingAt) -> list[str]:
-    """What to do about the line of a finding."""
-    rows = results.instructions
-    own = (rows.program == program.name) & (rows.line == found.line) & (Path(program.file).name == found.file)
-    return remedies(_same_line(program, found), int(rows.times[own].sum()))
 
 
 def _cause(program: ProgramSummary, found: FindingAt) -> str:

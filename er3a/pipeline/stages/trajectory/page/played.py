@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -284,10 +285,10 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
 
 
 def _few_words(part: model.Stretch) -> str:
-    """Why a stretch is an event; of bodies that overlap the first two."""
+    """Why a stretch is an event, up to where its details begin; of bodies that overlap the first two."""
     if is_one(part.cause, "bodies_overlap"):
         return say(part.cause.touches[0].pair)
-    return rate_needed(part.cause) if is_one(part.cause, *RATES) else cause_text(part)
+    return rate_needed(part.cause) if is_one(part.cause, *RATES) else re.split(" ?[;(；（]", cause_text(part))[0]
 
 
 def _near_events(path: model.PathSummary, near: Finding | None, clearance: model.Clearances) -> list[PlayedEvent]:

@@ -145,7 +145,7 @@ def _sound_row(path: model.PathSummary, length: float, limits: model.LimitsUsed)
     """A path that may be run, with how near it comes to anything, and the joint speed that is nearest to its limit."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
     rate = tr("joint speed nearest its limit (deg/s)")
-    said = Fix(f"{path.name}: {rate}: {_speed(path, limits)}; {_clear_of(path) or '–'}", f"#{path.name}")
+    said = Fix(f"{rate}: {_speed(path, limits)}; {_clear_of(path) or '–'}", f"#{path.name}")
     return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length, fix=said)
 
 
