@@ -205,11 +205,6 @@ class Stored(ByValue, Generic[ResultsT]):
         return self.results.summary.verdict.status
 
     @property
-    def contradicted(self) -> bool:
-        """Whether evidence contradicts the table that all rests on."""
-        return self.rests_on.get("validation") == "fail"
-
-    @property
     def validated(self) -> Path | None:
         """Where validation's results of the robot are, if there are any."""
         folder = self.folder.parent / "validation" if self.folder else None

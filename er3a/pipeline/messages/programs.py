@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.finding import Amount, Finding, fact, is_one
+from er3a.finding import Amount, Finding, is_one
 from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.language import N_, tr, words
 from er3a.pipeline.messages import expectations  # noqa: F401
@@ -270,17 +269,6 @@ def rates_text(paces: Sequence[RateCause]) -> str:
 def singular_cause(found: Finding) -> str:
     """That a line comes to a singular pose, and how the arm stands there."""
     return sentence("path.cause", event=found, pose=singular_pose(found.type))
-
-
-def told_of_passes(findings: Sequence[FindingAt], times: int) -> list[FindingAt]:
-    """Findings at one line; what is out of reach in fewer passes than its ``times``, in a loop that drifts, says so."""
-    short = [each for each in findings if is_one(each.finding, *OUT_OF_REACH)]
-    if not short or sum(each.times for each in short) >= times:
-        return [*findings]
-    return [
-        replace(each, finding=fact("later_out_of_reach", reasons=each.finding.reasons)) if each in short else each
-        for each in findings
-    ]
 
 
 def remedies(findings: Sequence[Finding | FindingAt]) -> list[str]:

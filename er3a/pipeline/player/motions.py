@@ -160,14 +160,13 @@ def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:
     return [*([Part(end, 1.0, "none")] if end < 0.995 else []), *parts]
 
 
-def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length: float, note: str = "") -> ListRow:
+def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0, note: str = "") -> ListRow:
     """A path or program that may not be run as it is, as a row of the list at the picture's side.
 
     Parameters
     ----------
     motion : that the player shows; None where it shows none, as of one with no two moments
-    duration_s : of the whole motion, s
-    length : of its bar, in parts of the longest
+    duration_s : of the whole motion, s, where the arm does not get to its end
     note : in few words why; its verdict if empty
 
     Returns
@@ -182,7 +181,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length:
         note or fault.verdict,
         f"#{fault.name}",
         (fault.name, seen or 0.0) if motion else None,
-        length if parts else 0.0,
+        float(bool(parts)),
         parts,
         fix_of([fault]),
     )

@@ -23,6 +23,7 @@ const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, nowShown] = ["arm", "motion", "time", "clock", "now-shown"].map(part);
+const void_ = document.querySelector(".runs .no_verdict") && { events: [], marks: [], text: words.not_judged }; // of a wrong table
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const floor = data.floor ?? column(table.base, 3)[2];
 
@@ -48,7 +49,7 @@ const stretches = [...document.querySelectorAll("[data-from]")];
 function prepared(motion) {
   const count = motion.times.length;
   const loads = motion.loads && decodeValues(motion.loads, count);
-  return { ...motion, loads, values: motion.values.map((text) => decodeValues(text, count)), trails: null };
+  return { ...motion, ...void_, loads, values: motion.values.map((text) => decodeValues(text, count)), trails: null };
 }
 
 const start = () => motion.times[0];
@@ -163,7 +164,7 @@ function sticks(poses, css, shown) {
 
 /** The axis of row `j`, whose frame is `T`, through the whole picture. */
 function singularAxis(j, T) {
-  const [middle, way] = [moved(T, data.rows[j - 1].middle), scaled(column(T, 2), 0.45 * data.size)];
+  const [middle, way] = [moved(T, data.rows[j - 1].middle), scaled(column(T, 2), 0.3 * data.size)];
   space.line([subtract(middle, way), add(middle, way)], data.colours.caution, 2.5);
   space.word(`J${j}`, add(middle, way), space.page.doubtful);
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +57,6 @@ def player(
     beside: Sequence[Robot] = (),
     signs: Sequence[str] = (),
     opened: tuple[str, float] | None = None,
-    judged: bool = True,
     added: Sequence[Shape] = (),
 ) -> Markup:
     """The player as HTML, one a page, whose head holds ``drawing_head``; empty where there is no motion.
@@ -65,14 +64,11 @@ def player(
     Parameters
     ----------
     opened : the motion and the time (s) that it opens at; None for the first motion's start
-    judged : whether what happens on motions is said; not of a table that evidence contradicts
     beside : further arms, which move at the same time; their bases say where they stand
     added : shapes of ``viewing/drawn.py`` around the arm, or in its tool's frame, that nothing collides with
     signs : what is written below the base of each arm, the first included; nothing if empty
     """
     shown = [motion for motion in motions if len(motion.t) > 1]
-    if not judged:
-        shown = [replace(motion, text=tr("Not judged"), events=(), marks=()) for motion in shown]
     if not shown:
         return Markup()
     data = _data(robot, shown, scene, beside, signs)

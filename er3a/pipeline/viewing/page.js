@@ -121,14 +121,12 @@ function toolButton(label, action) {
 
 function enlarge(image) {
   const dialog = document.createElement("dialog");
-  dialog.className = "enlarged";
-  dialog.setAttribute("aria-label", image.alt);
+  Object.assign(dialog, { className: "enlarged", ariaLabel: image.alt, closedBy: "any" });
   const close = toolButton(WORDS.close, () => dialog.close());
   const large = image.cloneNode();
   dialog.append(close, large);
   if (large.dataset.axes) answer(large);
   dialog.addEventListener("close", () => dialog.remove());
-  dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
   document.body.append(dialog);
   dialog.showModal();
 }
@@ -306,11 +304,10 @@ function answerPointer(image, linesAt) {
 function keepInAddress(queries, place) {
   const address = new URL(location.href);
   for (const [name, value] of Object.entries(queries)) value ? address.searchParams.set(name, value) : address.searchParams.delete(name);
+  if (place) ["play", "t", "until"].forEach((name) => address.searchParams.delete(name)); // of another choice
   if (place) address.hash = encodeURIComponent(place);
   history.replaceState(history.state, "", address);
 }
-
-const MOMENT = { play: "", t: "", until: "" }; // of another choice, which an address may name
 
 const MANY_ROWS = 12;
 
@@ -766,7 +763,7 @@ const other = (row) => new URLSearchParams(row.dataset.instead?.split(/[?#]/)[1]
 const playing = (name) => rows.find((row) => row.dataset.play === name) ?? rows.find((row) => name && other(row) === name);
 const choose = (row, name) => {
   mark(row);
-  keepInAddress(MOMENT, name);
+  keepInAddress({}, name);
 };
 for (const row of rows) row.addEventListener("click", () => (row.dataset.play ? choose(row, nameOf(row)) : mark(row)));
 const named = addressed();

@@ -45,7 +45,7 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group
+from er3a.pipeline.viewing.answer import Answer, Group
 from er3a.version import __version__
 
 if TYPE_CHECKING:
@@ -232,11 +232,6 @@ class Head:
         """Whether evidence contradicts the table that all rests on, so that nothing is said of the robot."""
         first = self.caveats.get("validation")
         return first is not None and first.status == "fail" and self.status != "not_computed"
-
-    @property
-    def wrong(self) -> bool:
-        """Whether this is where evidence contradicts the table."""
-        return self.stage == "validation" and self.status == "fail"
 
     @property
     def sign(self) -> str:
@@ -452,10 +447,8 @@ def render_stage(
         grey = partial(replace, mark="no_verdict", note="", length=0.0, fix=None)
         rows = [grey(row) for group in answer.groups for row in group.rows if row.play]
         groups = [Group(tr("Not judged"), rows)]
-        fix = Fix(tr("Never use this table."), "validation.html", instead=False)
-        if stored.folder and (other := alternative_table(study, stored.robot, stored.folder.parents[1])):
-            fix = use_table(study, other, stage)
-        answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."), groups=groups, fix=fix)
+        answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."), groups=groups)
+        context["instead"] = alternative_table(study, stored)
     box = _tray_edges(study, stored) if STAGES[stage].obstacles else ""
     template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
     render(template, output, head.summary, answer=answer, never=never_text(stage), box=box, **framed | context)
@@ -485,7 +478,7 @@ def robots_with(study: Study, page: str) -> list[tuple[str, str, str]]:
 def _tray_edges(study: Study, stored: Stored[Any]) -> str:
     """The edges (mm) of the tray that the workspace page may place, which no other stage takes for an obstacle;
     empty where no place is asked for or recommended."""
-    if "workspace" not in study.stages(stored.robot) or stored.contradicted:
+    if "workspace" not in study.stages(stored.robot) or stored.rests_on.get("validation") == "fail":
         return ""
     return " × ".join(f"{edge:g}" for edge in study.section(CapabilitySettings).placement.box_mm)
 
@@ -620,19 +613,19 @@ def _commit() -> str | None:
     return commit and commit + (" + changes" if git("status", "--porcelain", "--untracked-files=no") else "")
 
 
-def alternative_table(study: Study, name: str, results: Path) -> str | None:
+def alternative_table(study: Study, stored: Stored[Any]) -> str | None:
     """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out.
 
     Parameters
     ----------
-    name : of the robot
-    results : folder of all results
+    stored : what a stage found of the robot
 
     Returns
     -------
     name : of the other robot, with a verdict of pass or caution; None where none was computed or bears out
     """
-    for other in study.other_tables(name):
+    results = stored.folder.parents[1] if stored.folder else Path()
+    for other in study.other_tables(stored.robot):
         try:
             status = read_status(results / other / "validation")
         except ResultError:
@@ -640,13 +633,6 @@ def alternative_table(study: Study, name: str, results: Path) -> str | None:
         if status in ("pass", "caution"):
             return other
     return None
-
-
-def use_table(study: Study, other: str, stage: str) -> Fix:
-    """To use another robot's table, and the page of a stage that it has there."""
-    page = stage if stage in study.stages(other) else "validation"
-    title = language.own_title(study.robot(other).title)
-    return Fix(tr("use the table of {robot}.", robot=title), f"../{other}/{page}.html")
 
 
 def panel_link(q_deg: Iterable[float], text: str) -> str:

@@ -74,7 +74,6 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
             [*motions(robot, results), *poses(robot, results)],
             scene,
             opened=worst,
-            judged=not stored.contradicted,
         ),
         drawing_head=drawing_head(),
         home=_angles(robot, np.array(summary.home_deg or ())),

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from dataclasses import replace
-from itertools import chain
 from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
 
 from er3a.collision.pairs import names_of
-from er3a.finding import Finding, is_one
+from er3a.finding import Finding, fact, is_one
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import times_needed
-from er3a.pipeline.messages.programs import rates_text, remedies, singular_cause, told_of_passes
+from er3a.pipeline.messages.programs import OUT_OF_REACH, rates_text, remedies, singular_cause
 from er3a.pipeline.messages.say import joined, say, say_first
 from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of, at_rest
 from er3a.pipeline.stages.expectations import is_met
@@ -111,19 +109,21 @@ def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
 
 def worst_first(results: ProgramsResults) -> list[ProgramSummary]:
     """Programs with what was found: those that fail first, of them those that were not expected to."""
-    programs = []
-    for program in results.summary.programs:
-        rows = results.instructions.take(results.instructions.program == program.name)
-        places: dict[tuple[str, int], list[FindingAt]] = defaultdict(list)
-        for each in program.findings:
-            places[each.file, each.line].append(each)
-        own = Path(program.file).name
-        found = (
-            told_of_passes(here, int(rows.times[(rows.line == line) & (file == own)].sum()))
-            for (file, line), here in places.items()
-        )
-        programs.append(replace(program, findings=tuple(chain(*found))))
+    programs = [
+        replace(program, findings=tuple(_of_passes(results, program, each) for each in program.findings))
+        for program in results.summary.programs
+    ]
     return sorted(programs, key=lambda each: (-RANKS[each.outcome], is_met(each)))
+
+
+def _of_passes(results: ProgramsResults, program: ProgramSummary, found: FindingAt) -> FindingAt:
+    """A finding; of what is out of reach in fewer passes than its line has, in a loop that drifts, that."""
+    short = [each for each in _same_line(program, found) if is_one(each.finding, *OUT_OF_REACH)]
+    rows = results.instructions
+    own = (rows.program == program.name) & (rows.line == found.line) & (Path(program.file).name == found.file)
+    if found not in short or sum(each.times for each in short) >= rows.times[own].sum():
+        return found
+    return replace(found, finding=fact("later_out_of_reach", reasons=found.finding.reasons))
 
 
 def faults(results: ProgramsResults) -> list[Fault]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -55,10 +56,10 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         programs_answer(robot, results),
         sections=sections,
-        entered=None if stored.contradicted else in_tray(study, stored),
+        entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
         compared_with_tray=compared_with_tray,
         faults={fault.name: fault for fault in wrong},
-        player=player(robot, played, scene, opened=opened(wrong), judged=not stored.contradicted),
+        player=player(robot, played, scene, opened=opened(wrong)),
         bodies=[each.name for each in scene.solids] if scene else [],
         drawing_head=drawing_head(),
     )
@@ -68,11 +69,7 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     """How many programs may be run, each with its bar over time, and what to do about the first of the others."""
     summary, wrong = results.summary, faults(results)
     shown = {motion.name: motion for motion in motions(robot, results)}
-    notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
-    moved = set(results.motion.program.tolist())
-    bad = {
-        each.name: row_of(each, shown[each.name], 0.0, float(each.name in moved), notes[each.name]) for each in wrong
-    }
+    bad = {each.name: row_of(each, shown[each.name], note=in_few_words(each.moments[0].what)) for each in wrong}
     good = [each for each in summary.programs if each.name not in bad]
     sound = [
         ListRow(
@@ -183,7 +180,7 @@ def _listing(
                 text=words,
                 level=level,
                 word=level and level_word(level),
-                brief=here and in_few_words(say(min(here, key=weight).finding)),
+                brief=here and re.split("[;；]", say(min(here, key=weight).finding))[0],
                 remarks=[_remark(name, each) for each in sorted(here, key=cause_first)],
                 remedies=remedies(here),
                 facts=_facts(rows, moves[number]),

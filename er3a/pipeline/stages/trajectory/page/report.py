@@ -39,7 +39,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, ListRow, judged, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, ListRow, judged, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
@@ -57,7 +57,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     scene = study.scene(stored.robot, stored.stage)
     sections = []
     count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
-    paths, contradicted = worst_first(summary.paths), stored.contradicted
+    paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
     lines = program_head(stored.validated, summary.checked, summary.assumed)
     met = None if contradicted else met_in_tray(study, stored)
     wrong = {} if contradicted else _by_name(results)
@@ -83,7 +83,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
         drawn_paths=count,
-        player=player(robot, played, scene, opened=opened(wrong.values()), judged=not contradicted),
+        player=player(robot, played, scene, opened=opened(wrong.values())),
         drawing_head=drawing_head(),
     )
 
@@ -113,23 +113,22 @@ def answer_of(
     met = met or {}
     motions, known = {motion.name: motion for motion in played}, {path.name: path for path in summary.paths}
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
-    shares = dict(zip((path.name for path in paths), lengths(path.duration_s for path in paths)))
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
     faulty, others = paths[: len(wrong)], paths[len(wrong) :]
     fault_rows = {}
     for path in faulty:
-        row = row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
+        row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
         fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
     repairable = [fault_rows[path.name] for path in faulty if path.chosen and path.name not in hindered]
     limits = summary.joint_limits
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
-        replace(_sound_row(path, shares[path.name], limits), mark="fail", note=as_expected(path), fix=None)
+        replace(_sound_row(path), mark="fail", note=as_expected(path))
         for path in others
         if path.expect and not is_met(path)
     ]
     rows = [*unlike, *(row for row in fault_rows.values() if row not in repairable)]
-    groups = judged([*rows, *(_sound_row(path, shares[path.name], limits) for path in sound)], repairable)
+    groups = judged([*rows, *map(_sound_row, sound)], repairable)
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
@@ -141,12 +140,10 @@ def answer_of(
     return Answer(headline, rest, "", keys, groups, fix)
 
 
-def _sound_row(path: model.PathSummary, length: float, limits: model.LimitsUsed) -> ListRow:
-    """A path that may be run, with how near it comes to anything, and the joint speed that is nearest to its limit."""
+def _sound_row(path: model.PathSummary) -> ListRow:
+    """A path that may be run, with how near it comes to anything."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    rate = tr("joint speed nearest its limit (deg/s)")
-    said = Fix(f"{rate}: {_speed(path, limits)}; {_clear_of(path) or '–'}", f"#{path.name}")
-    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length, fix=said)
+    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), 1.0)
 
 
 def _programs(
@@ -212,18 +209,16 @@ def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks, near:
     return path_picture(robot, path, _drawn(path, rows), near, alt, whole_sentence(text))
 
 
-def _nearness(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, str, Picture]]:
-    """Of a path, and of the motion that repairs it: address, name, and how near it comes over time."""
+def _nearness(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:
+    """Of a path, and of the motion that repairs it: its name, and how near it comes over time."""
     rows, shapes = results.clearance.take(results.clearance.path == path.name), results.summary.verdict.shapes
-    found, motion = [], path.chosen and path.chosen.motion
-    if path.clearance:
-        picture = nearness_picture(path.name, path.clearance, rows.take(rows.strategy == ""), shapes, path)
-        found.append((path.name, path.name, picture))
-    if motion and motion.clearance:
-        own = rows.take(rows.strategy == path.strategy)
-        picture = nearness_picture(repaired(path), motion.clearance, own, shapes)
-        found.append((f"{path.name}-repaired", repaired(path), picture))
-    return found
+    motion = path.chosen and path.chosen.motion
+    shown = [(path.name, "", path.clearance, path), (repaired(path), path.strategy, motion and motion.clearance, None)]
+    return [
+        (name, nearness_picture(name, least, rows.take(rows.strategy == strategy), shapes, faulty))
+        for name, strategy, least, faulty in shown
+        if least
+    ]
 
 
 def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:

@@ -40,7 +40,6 @@ from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
     text_address,
-    use_table,
 )
 from er3a.pipeline.viewing.side_view import (
     COLUMN,
@@ -144,11 +143,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     corrected, _ = diagnosis_section.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
     text = robot_text(file) if file else ""
-    instead = (
-        alternative_table(study, name, stored.folder.parents[1])
-        if summary.verdict.status == "fail" and stored.folder
-        else None
-    )
+    instead = alternative_table(study, stored) if summary.verdict.status == "fail" else None
     evidence = evidence_section(robot, summary.evidence)
     disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
     render_stage(
@@ -268,7 +263,10 @@ def _answer(
         if unsure and not bad:
             below = tr("A check that other values would pass as well settles no entry.")
     if instead:
-        fix = use_table(study, instead, "validation")
+        fix = Fix(
+            tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),
+            f"../{instead}/validation.html",
+        )
     elif disputed:
         stated = joined([fixed(each.expected, 1) for each in disputed[0].statements], " or ")
         fix = Fix(

@@ -367,7 +367,7 @@ def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
 
     None if that is nowhere, or evidence contradicts the table that all rests on.
     """
-    if stored.contradicted:
+    if stored.rests_on.get("validation") == "fail":
         return None
     beside = stored.folder.parent if stored.folder else None
     names = [name for name in ("workspace", "inverse", *MOTIONS) if beside and is_computed(beside / name)]
