@@ -11,8 +11,7 @@ from urllib.parse import urlencode
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import first_sentence, tr
-from er3a.pipeline.messages.say import joined
+from er3a.pipeline.language import first_sentence
 from er3a.pipeline.viewing.answer import Fix, ListRow, Part
 from er3a.robots.robot import Robot
 
@@ -68,35 +67,20 @@ class Fault:
     ``moments``: of a path what fails first, then what fails later and weighs more, then what only follows from it; of
     a program what weighs most, then what fails before that. ``cause``: what all of it comes from, such as a singular
     pose, empty where nothing is known.
-    ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that, said in words by ``expected``
-    (empty where it expects nothing).
+    ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that.
     ``address``: of the place on the robot's pages, which the player shows there; ``instead``: a motion that may be run,
     and where the player shows it.
     """
 
     name: str
-    title: str
     status: Weight
     verdict: str
     meant: bool
-    expected: str
     moments: tuple[FaultMoment, ...]
     to_do: str
     address: str
     instead: tuple[str, str] | None = None
     cause: str = ""
-
-    @property
-    def when(self) -> str:
-        """When it fails first."""
-        return self.moments[0].when
-
-    @property
-    def what(self) -> str:
-        """All that fails, each after the first with its moment."""
-        first, *later = self.moments
-        placed = [tr("{where}: {text}", where=m.when, text=m.what) if m.when else m.what for m in later]
-        return joined([first.what, *placed])
 
 
 def address_of(page: str, motion: str, t: float, place: str, until: float | None = None) -> str:

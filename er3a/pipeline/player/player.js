@@ -23,7 +23,7 @@ const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, nowShown] = ["arm", "motion", "time", "clock", "now-shown"].map(part);
-const void_ = document.querySelector(".runs .no_verdict") && { events: [], marks: [], text: words.not_judged }; // of a wrong table
+const unjudged = document.querySelector(".runs .no_verdict") && { events: [], marks: [], text: words.not_judged }; // of a wrong table
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const floor = data.floor ?? column(table.base, 3)[2];
 
@@ -49,7 +49,7 @@ const stretches = [...document.querySelectorAll("[data-from]")];
 function prepared(motion) {
   const count = motion.times.length;
   const loads = motion.loads && decodeValues(motion.loads, count);
-  return { ...motion, ...void_, loads, values: motion.values.map((text) => decodeValues(text, count)), trails: null };
+  return { ...motion, ...unjudged, loads, values: motion.values.map((text) => decodeValues(text, count)), trails: null };
 }
 
 const start = () => motion.times[0];

@@ -61,11 +61,7 @@ function makeSortable(table) {
   const headers = [...table.tHead.rows[0].cells];
   headers.forEach((header, column) => {
     // No button element: browsers leave those out of a header that is repeated on the next printed sheet.
-    const control = document.createElement("span");
-    control.role = "button";
-    control.tabIndex = 0;
-    control.className = "sort";
-    control.title = WORDS.sort;
+    const control = Object.assign(document.createElement("span"), { role: "button", tabIndex: 0, className: "sort", title: WORDS.sort });
     control.append(...header.childNodes);
     header.append(control);
     const turn = () => {
@@ -643,15 +639,9 @@ function explainTerms(terms) {
 }
 
 function explain(text, meaning) {
-  const term = document.createElement("span");
-  const tip = document.createElement("span");
-  term.className = "term";
-  term.tabIndex = 0;
-  tip.className = "tip";
-  tip.role = "tooltip";
-  tip.id = `term-${document.querySelectorAll(".tip").length}`;
-  tip.textContent = meaning;
-  tip.hidden = true;
+  const term = Object.assign(document.createElement("span"), { className: "term", tabIndex: 0 });
+  const id = `term-${document.querySelectorAll(".tip").length}`;
+  const tip = Object.assign(document.createElement("span"), { id, className: "tip", role: "tooltip", textContent: meaning, hidden: true });
   term.setAttribute("aria-describedby", tip.id);
   text.replaceWith(term);
   term.append(text);

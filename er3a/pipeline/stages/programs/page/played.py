@@ -11,8 +11,8 @@ import numpy as np
 
 from er3a.collision.pairs import names_of
 from er3a.finding import Finding, fact, is_one
-from er3a.pipeline.language import own_title, tr
-from er3a.pipeline.messages.expectations import as_expected, outcome_word
+from er3a.pipeline.language import tr
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import times_needed
 from er3a.pipeline.messages.programs import OUT_OF_REACH, rates_text, remedies, singular_cause
@@ -141,11 +141,9 @@ def faults(results: ProgramsResults) -> list[Fault]:
         found.append(
             Fault(
                 program.name,
-                own_title(program.title),
                 WEIGHTS[program.outcome],
                 outcome_word(program.outcome),
                 is_met(program),
-                as_expected(program),
                 moments,
                 " ".join(dict.fromkeys(text for each in shown for text in remedies(_same_line(program, each))[:1])),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),

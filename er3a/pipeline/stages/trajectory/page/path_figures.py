@@ -75,7 +75,7 @@ def nearness_picture(
     shapes : the assumed ones, which may be wrong by their margin; None where none are assumed
     path : whose faults are marked; None of a motion that repairs them
     """
-    figure, ax = new_figure(width=5.2, height=2.9)
+    figure, ax = new_figure(width=5.2, height=2.6)
     ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
     if path:
         _mark(ax, path)

@@ -11,8 +11,8 @@ import numpy as np
 from er3a.collision.pairs import names_of
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import own_title, tr
-from er3a.pipeline.messages.expectations import as_expected, outcome_word
+from er3a.pipeline.language import tr
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import rate_needed, times_needed
 from er3a.pipeline.messages.programs import remedies
@@ -106,11 +106,9 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         found.append(
             Fault(
                 path.name,
-                own_title(path.title),
                 status,
                 verdict,
                 path.verdict != "safe" and is_met(path),
-                as_expected(path),
                 moments,
                 to_do,
                 address_of("trajectory", path.name, moments[0].seen_s or 0.0, path.name),
