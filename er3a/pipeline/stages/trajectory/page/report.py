@@ -120,7 +120,6 @@ def answer_of(
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
         fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
     repairable = [fault_rows[path.name] for path in faulty if path.chosen and path.name not in hindered]
-    limits = summary.joint_limits
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
         replace(_sound_row(path), mark="fail", note=as_expected(path))
@@ -134,7 +133,7 @@ def answer_of(
     clear = [path.clearance.least_mm for path in sound if path.clearance]
     speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
-    limit = tr("of assumed speed limits") if any(limits.speed_assumed) else tr("of a joint's speed limit")
+    limit = tr("of assumed speed limits") if any(summary.joint_limits.speed_assumed) else tr("of a joint's speed limit")
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), limit)] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
     return Answer(headline, rest, "", keys, groups, fix)
