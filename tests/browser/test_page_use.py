@@ -422,3 +422,67 @@ def test_the_figure_in_space_is_drawn_and_leaves_out_what_it_is_asked_to(browser
     emptied = browser.execute_script(PAINTED)
     browser.execute_script("arguments[0].click()", checks[-1])
     WebDriverWait(browser, PAUSE).until(lambda _: browser.execute_script(PAINTED) < emptied)
+
+
+CHOSEN = """return [
+  document.querySelector(".runs [aria-current] b").textContent, document.querySelector(".player .motion").value,
+  document.querySelector(".player .clock").textContent,
+]"""
+
+
+def shown_row(browser) -> list[str]:
+    """The chosen row, the motion that is played, and its time."""
+    WebDriverWait(browser, PAUSE).until(
+        lambda _: browser.execute_script("return performance.getEntriesByName('player').length")
+    )
+    return browser.execute_script(CHOSEN)
+
+
+@pytest.mark.parametrize("stage", ["trajectory", "programs", "collision", "dynamics"])
+def test_the_chosen_row_is_in_the_address(browser, small_study, stage):
+    """A reload and the way back lead to it and to its moment, though rows may share a motion."""
+    browser.get((small_study.folder / f"reports/er3a_c60/{stage}.html").as_uri())
+    shown_row(browser)
+    rows = browser.find_elements(By.CSS_SELECTOR, ".runs a[data-play]")
+    browser.execute_script("arguments[0].click()", rows[1])
+    WebDriverWait(browser, PAUSE).until(lambda _: "#" in browser.current_url)
+    chosen = shown_row(browser)
+    browser.refresh()
+    assert shown_row(browser) == chosen
+    browser.execute_script("document.querySelector('header nav a').click()")
+    WebDriverWait(browser, PAUSE).until(lambda _: "validation.html" in browser.current_url)
+    browser.back()
+    assert shown_row(browser) == chosen
+
+
+def test_the_chart_beside_the_player_is_of_the_motion_that_is_played(browser, small_study):
+    browser.get((small_study.folder / "reports/er3a_c60/trajectory.html").as_uri())
+    shown_row(browser)
+    repaired = next(
+        option.get_attribute("value")
+        for option in browser.find_elements(By.CSS_SELECTOR, ".player .motion option")
+        if option.get_attribute("value").endswith(", repaired")
+    )
+    row = repaired.removesuffix(", repaired")
+    browser.execute_script("arguments[0].click()", browser.find_element(By.CSS_SELECTOR, f'a[data-play="{row}"]'))
+    heading = ".curves [data-one-of] > :not([hidden]) h2"
+    WebDriverWait(browser, PAUSE).until(
+        lambda _: browser.find_element(By.CSS_SELECTOR, heading).text.startswith(f"{row}:")
+    )
+    browser.execute_script("document.querySelector('.hero .fix a').click()")
+    WebDriverWait(browser, PAUSE).until(
+        lambda _: browser.find_element(By.CSS_SELECTOR, heading).text.startswith(f"{repaired}:")
+    )
+    assert shown_row(browser)[:2] == [row, repaired]
+
+
+def test_nothing_is_judged_by_a_table_that_evidence_contradicts(browser, small_study):
+    browser.get((small_study.folder / "reports/er3a_c60_article/trajectory.html").as_uri())
+    shown_row(browser)
+    for row in browser.find_elements(By.CSS_SELECTOR, ".runs a[data-play]"):
+        browser.execute_script("arguments[0].click()", row)
+        browser.execute_script("document.querySelector('.player .forward').click()")
+        assert browser.find_element(By.CSS_SELECTOR, ".player .now-shown").text == "Not judged"
+        assert not browser.find_elements(By.CSS_SELECTOR, ".player .tick")
+    link = browser.find_element(By.CSS_SELECTOR, ".fix a").get_attribute("href")
+    assert link.endswith("er3a_c60/trajectory.html")

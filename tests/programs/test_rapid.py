@@ -365,7 +365,7 @@ def test_with_the_wrist_in_line_any_share_of_its_joints_has_the_configuration(se
     turn = ",".join(f"{each:.6g}" for each in Rotation.from_matrix(pose[:3, :3]).as_quat()[[3, 0, 1, 2]])
     xyz = ",".join(f"{each * 1000:.2f}" for each in pose[:3, 3])
     for turned in (0.0, np.pi / 2, np.pi):  # of the first joint a quarter or half a turn off: no solution is there
-        quarters = np.floor((q + [turned, 0, 0, 0, 0, 0])[[0, 3, 5]] / (np.pi / 2)).astype(int).tolist()
+        quarters = np.floor((q[[0, 3, 5]] + np.array([turned, 0, 0])) / (np.pi / 2)).astype(int).tolist()
         program = read_program(
             saved(tmp_path, f"MoveJ [[{xyz}],[{turn}],[{quarters[0]},{quarters[1]},{quarters[2]},0],{NONE}],@;")
         )

@@ -24,7 +24,7 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.programs.compute import compute as compute_programs
 from er3a.pipeline.stages.programs.model import RESULTS, ProgramsResults
-from er3a.pipeline.stages.programs.page.played import faults, motions
+from er3a.pipeline.stages.programs.page.played import faults, motions, worst_first
 from er3a.pipeline.stages.programs.page.record import record
 from er3a.pipeline.stages.programs.page.report import report
 from er3a.pipeline.stages.registry import STAGES
@@ -107,6 +107,24 @@ def test_an_unexpected_fault_fails_the_stage(study, tmp_path):
     )
 
 
+def test_what_is_out_of_reach_in_later_passes_alone_says_so(stored):
+    """A line that was carried out more often than it was out of reach is in a loop that drifts."""
+    results = stored["er3a_c60"].results
+    (loop,) = (each for each in results.summary.programs if each.name == "drifting_loop")
+    short = sum(each.times for each in loop.findings if each.finding.code.endswith("out_of_reach"))
+    rows = results.instructions
+    always = type(rows)(**{name: getattr(rows, name) for name in rows.columns()} | {"times": np.full(len(rows), short)})
+
+    def codes(found):
+        programs = {each.name: each for each in worst_first(found)}
+        return [{each.finding.code for each in programs[name].findings} for name in ("drifting_loop", "out_of_reach")]
+
+    drifts, ends = codes(results)
+    assert ("later_out_of_reach" in drifts, "way_out_of_reach" in drifts) == (True, False)
+    assert "way_out_of_reach" in ends
+    assert "later_out_of_reach" not in codes(replace(results, instructions=always))[0]
+
+
 @pytest.mark.long
 def test_page_and_recording_are_written(study, stored, tmp_path):
     import_module(STAGES["programs"].messages)
@@ -117,7 +135,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     met = motion.take((motion.program == "collision_with_table") & (motion.line == 10))
     assert f'data-play="collision_with_table" data-from="{met.t_s[0]}" data-t="{met.t_s[-1]}"' in html
     assert html.count('<div class="listing"') == len(stored["er3a_c60"].results.summary.programs)
-    assert "not followed: TOOL_DATA[7] (this tool is not given)" in html
+    assert "this tool is not given: not followed: TOOL_DATA[7]" in html
     program = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == "outside_limits")
     found = next(each for each in program.findings if each.finding.code == "above_limit")
     said = f"from {found.motion_s:.2f} s into this line on"
@@ -129,7 +147,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     (fault,) = (each for each in listed if each.name == "collision_with_table")
     own = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == fault.name)
     first = next(each for each in own.findings if each.finding.code == "motion_collides")
-    assert fault.when == f"line 10, {first.motion_s:.2f} s into it (player: {first.program_s:.2f} s)"
+    assert fault.moments[0].when == f"line 10, {first.motion_s:.2f} s into it (player: {first.program_s:.2f} s)"
     for each in listed:  # what the index links to
         name, t, place = re.fullmatch(r"programs\.html\?play=(\w+)&t=([\d.]+)#([\w.-]+)", each.address).groups()
         assert name == each.name
@@ -145,7 +163,8 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     told = (replace(grave, level="caution", program_s=0.0), replace(grave, line=0, program_s=1.0))
     nowhere = replace(summary, programs=(replace(program, findings=told),))
     (fault,) = faults(replace(stored["er3a_c60"].results, summary=nowhere))
-    assert not re.search(r"[;.:。；] *[:：]", fault.what), fault.what
+    for moment in fault.moments:
+        assert not re.search(r"[;.:。；] *[:：]", moment.what), moment.what
     assert re.search("[Ll]ower this line.{1,6}s speed to ", html)
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
 

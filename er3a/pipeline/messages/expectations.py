@@ -14,7 +14,7 @@ OUTCOMES: dict[Outcome, str] = words(
         "collides": "collides",
         "too fast": "too fast",
         "singular": "singular",
-        "too fast for the assumed limits": "too fast for the assumed limits",
+        "too fast for the assumed limits": "too fast (assumed)",
         "undecided": "undecided",
         "near-singular": "near-singular",
         "safe": "pass",
@@ -47,9 +47,10 @@ def outcome_word(outcome: Outcome) -> str:
 
 
 def as_expected(judged: Judged) -> str:
-    """Whether one came to what its file expects, or to what else; empty where it expects nothing."""
+    """To what else than its file expects one came; empty where it came to that, or where nothing is expected."""
     expected, found = expected_of(judged), came_to(judged)
     if not expected:
         return ""
     others = [outcome for outcome in found if outcome not in expected] if set(expected) < set(found) else []
-    return sentence("as_expected", wrong=not (others or is_met(judged)), others=others)
+    met = is_met(judged)
+    return "" if met and not others else sentence("as_expected", wrong=not (others or met), others=others)

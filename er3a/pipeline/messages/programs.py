@@ -62,7 +62,7 @@ REASONS: dict[NotFollowedReason, str] = words(
     }
 )
 NEARER = N_("Move the target nearer to the arm, or tilt the tool towards it.")
-LATER = N_("Only later passes of this line are out of reach: end the loop before them, or set its target anew.")
+LATER = N_("End the loop before these passes, or set its target anew.")
 OUT_OF_REACH = ("target_out_of_reach", "way_out_of_reach")
 AT_START_MM = 0.5  # of a way: what ends within that is out of reach from its start
 OTHER_SOLUTION = N_(
@@ -73,6 +73,7 @@ REMEDIES: dict[str, str] = words(
     {
         "combination_exceeded": OTHER_SOLUTION,
         **dict.fromkeys(OUT_OF_REACH, NEARER),
+        "later_out_of_reach": LATER,
         "configuration_ends": "End the line before that point: it does not lead on in this configuration.",
         "joint_jumps": "Teach the target with this joint near to where it comes from.",
         "whole_turn": "Teach the target with the nearer angle, unless the turn is meant to unwind cables.",
@@ -130,7 +131,7 @@ TEXTS = texts(
             "[{programs:?}{passed} of {programs} programs pass.][ Fail: {failed:, }.][ Caution: {caution:, }.][ "
             "Not all examined: {not_examined:, }.][ Expected to fail, and did: {demonstrations:, }.]"
         ),
-        "not_followed": "not followed: {text:not_followed} ({reason:target_reason})",
+        "not_followed": "{reason:target_reason}: not followed: {text:not_followed}",
         "way_not_known": "start of the motion unknown; only the target was checked",
         "configuration_guessed": "{solutions} solutions possible: the joints before are not known",
         "configuration_not_met": "no solution within the limits, or not the line's end, has the configuration {text}",
@@ -139,8 +140,9 @@ TEXTS = texts(
         "clear_of_assumed": "{pair}: {clearance_mm:.1f} mm clear; assumed shapes may be off by {margin_mm:g} mm",
         "clearance_not_proven": "clear at points of the way; not settled between them in the given time",
         "zone_collides": "blending zone allows a collision ({assumed:shapes}): {pair}, {depth_mm:.1f} mm deep",
-        "zone_too_large": "zone {zone_mm:.1f} > motion {motion_mm:.1f} mm",
+        "zone_too_large": "zone larger than its line: {zone_mm:.1f} > {motion_mm:.1f} mm",
         "target_out_of_reach": "target out of reach: {reasons:; }",
+        "later_out_of_reach": "out of reach in later passes: {reasons:; }",
         "way_out_of_reach": (
             "out of reach[ at its start{at_start:?}][ after {at_mm:.1f} mm{at_start:!}]: {reasons:; }"
         ),
@@ -269,24 +271,15 @@ def singular_cause(found: Finding) -> str:
     return sentence("path.cause", event=found, pose=singular_pose(found.type))
 
 
-def remedies(findings: Sequence[Finding | FindingAt], times: int = 0) -> list[str]:
-    """What to do about findings at one line, each thing once: about those that weigh most; of speeds the slowest.
-
-    ``times``: how often the line is carried out; what is out of reach only later than the first time is in a loop that
-    drifts.
-    """
+def remedies(findings: Sequence[Finding | FindingAt]) -> list[str]:
+    """What to do about findings at one line, each thing once: about those that weigh most; of speeds the slowest."""
     located = [each for each in findings if isinstance(each, FindingAt)]
     worst = max((RANKS[each.level] for each in located), default=0)
     kept: list[Finding] = [each for each in findings if not isinstance(each, FindingAt)]
     kept += [each.finding for each in located if RANKS[each.level] == worst]
     fast = [each for each in kept if is_one(each, "too_fast")]
     slowest = max(fast, key=rate_ratio, default=None)
-    short = sum(each.times for each in located if is_one(each.finding, *OUT_OF_REACH))
-    said = (
-        tr(LATER) if short < times and is_one(each, *OUT_OF_REACH) else remedy(each)
-        for each in kept
-        if not is_one(each, "too_fast") or each is slowest
-    )
+    said = (remedy(each) for each in kept if not is_one(each, "too_fast") or each is slowest)
     return list(dict.fromkeys(filter(None, said)))
 
 

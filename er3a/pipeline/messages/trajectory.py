@@ -84,8 +84,8 @@ TEXTS = texts(
             "workpiece nearer{first:!}]"
         ),
         "advice.end": (
-            "End it at t = {t_s:.4g} s, ({xyz_mm:.1f, }) mm: [{margin:.1f} mm clear after a stop of {stop_s:.2f} s"
-            "][{margin:!}{left_s:.2f} s before the first fault; a stop takes {stop_s:.2f} s]"
+            "End it at t = {t_s:.4g} s: [{margin:.1f} mm clear after the stop][{margin:!}{left_s:.2f} s before the "
+            "first fault]. It is at ({xyz_mm:.1f, }) mm then; a stop takes {stop_s:.2f} s"
         ),
         "advice.slow_there": "Slow down from t = {start:.2f} to {end:.2f} s, to {percent} % at the slowest",
         "advice.no_part": "Run no part of it",
@@ -93,7 +93,7 @@ TEXTS = texts(
         "advice.clear": "{clearance:.1f} mm clear",
         "advice.slowly": "It is quicker than the {programmed:.2f} s programmed: another motion",
         "advice.region": "It still passes near the singular pose",
-        "advice.tool": "the tool [leaves the path by {far} mm, {turned}°][stays on the path{far:!}]",
+        "advice.tool": "[{far} mm, {turned}° off the path][the tool stays on the path{far:!}]",
         "advice.swing": "J{joint} turns by {swing:.0f}°",
         "advice.switch": (
             "[It begins at other joint angles ({changes:, }): the way there was not checked][The move to the other "
@@ -338,7 +338,10 @@ def repair_text(path: model.PathSummary, slowed: Slowed | None = None, switch: s
     tried, motion = _chosen(path)
     passes = path.singularities and not path.in_joint_space and not motion.keeps_clear
     quicker = tried.name == "planned" and motion.duration_s < path.duration_s
+    swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in path.sliding}
+    joint = max(swings, key=swings.__getitem__, default=0) if tried.name in BY_JOINTS else 0
     facts = [
+        sentence("advice.swing", joint=joint, swing=swings[joint]) if joint else "",
         sentence("advice.slowly", programmed=path.duration_s) if quicker else "",
         sentence("advice.region") if passes else "",
     ]
@@ -351,11 +354,7 @@ def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
     far, turned = motion.max_deviation_mm, motion.max_deviation_deg
     stays = far < NO_DEVIATION and turned < NO_DEVIATION
     tool = sentence("advice.tool", far="" if stays else _shortly(far), turned=_shortly(turned))
-    swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in path.sliding}
-    if tried.name in BY_JOINTS and swings:
-        joint = max(swings, key=swings.__getitem__)
-        tool = joined([tool, sentence("advice.swing", joint=joint, swing=swings[joint])])
-    clearance = None if motion.clearance_mm is None else math.floor(10 * motion.clearance_mm) / 10
+    clearance = math.floor(10 * motion.clearance.least_mm) / 10 if motion.clearance else None
     way = strategy_word(tried.name)
     if slowed:
         percent = math.floor(100 * slowed.part)

@@ -11,8 +11,7 @@ from urllib.parse import urlencode
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import first_sentence, tr
-from er3a.pipeline.messages.say import joined
+from er3a.pipeline.language import first_sentence
 from er3a.pipeline.viewing.answer import Fix, ListRow, Part
 from er3a.robots.robot import Robot
 
@@ -68,35 +67,20 @@ class Fault:
     ``moments``: of a path what fails first, then what fails later and weighs more, then what only follows from it; of
     a program what weighs most, then what fails before that. ``cause``: what all of it comes from, such as a singular
     pose, empty where nothing is known.
-    ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that, said in words by ``expected``
-    (empty where it expects nothing).
+    ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that.
     ``address``: of the place on the robot's pages, which the player shows there; ``instead``: a motion that may be run,
     and where the player shows it.
     """
 
     name: str
-    title: str
     status: Weight
     verdict: str
     meant: bool
-    expected: str
     moments: tuple[FaultMoment, ...]
     to_do: str
     address: str
     instead: tuple[str, str] | None = None
     cause: str = ""
-
-    @property
-    def when(self) -> str:
-        """When it fails first."""
-        return self.moments[0].when
-
-    @property
-    def what(self) -> str:
-        """All that fails, each after the first with its moment."""
-        first, *later = self.moments
-        placed = [tr("{where}: {text}", where=m.when, text=m.what) if m.when else m.what for m in later]
-        return joined([first.what, *placed])
 
 
 def address_of(page: str, motion: str, t: float, place: str, until: float | None = None) -> str:
@@ -167,14 +151,13 @@ def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:
     return [*([Part(end, 1.0, "none")] if end < 0.995 else []), *parts]
 
 
-def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length: float, note: str = "") -> ListRow:
+def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0, note: str = "") -> ListRow:
     """A path or program that may not be run as it is, as a row of the list at the picture's side.
 
     Parameters
     ----------
     motion : that the player shows; None where it shows none, as of one with no two moments
-    duration_s : of the whole motion, s
-    length : of its bar, in parts of the longest
+    duration_s : of the whole motion, s, where the arm does not get to its end
     note : in few words why; its verdict if empty
 
     Returns
@@ -189,7 +172,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length:
         note or fault.verdict,
         f"#{fault.name}",
         (fault.name, seen or 0.0) if motion else None,
-        length if parts else 0.0,
+        float(bool(parts)),
         parts,
         fix_of([fault]),
     )
@@ -207,5 +190,5 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
         if fault.to_do:
             place = fault.instead[1] if fault.instead else fault.address
             text = re.sub(r"(?<=\d) (?=(mm|s|%))", "\u00a0", first_sentence(fault.to_do)[0])  # units stay with values
-            return Fix(joined((fault.name, text), ": "), place, fault.status != "caution")
+            return Fix(text, place, fault.status != "caution")
     return None

@@ -16,12 +16,14 @@ const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
 const SLOW = 60; // ms between two frames: the next ones have fewer pixels
 const CLOSED = 0.02; // of the arm's size: a motion ends where it starts
+const ROUNDED = 1e-4; // s, of the times that a motion has
 
 const place = document.getElementById("player");
 const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, nowShown] = ["arm", "motion", "time", "clock", "now-shown"].map(part);
+const unjudged = document.querySelector(".runs .no_verdict") && { events: [], marks: [], text: words.not_judged }; // of a wrong table
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const floor = data.floor ?? column(table.base, 3)[2];
 
@@ -47,7 +49,7 @@ const stretches = [...document.querySelectorAll("[data-from]")];
 function prepared(motion) {
   const count = motion.times.length;
   const loads = motion.loads && decodeValues(motion.loads, count);
-  return { ...motion, loads, values: motion.values.map((text) => decodeValues(text, count)), trails: null };
+  return { ...motion, ...unjudged, loads, values: motion.values.map((text) => decodeValues(text, count)), trails: null };
 }
 
 const start = () => motion.times[0];
@@ -101,7 +103,7 @@ function frame(now) {
   if (playing) refresh();
 }
 
-const isNow = ({ t: from, until }) => t >= from - 1e-9 && t <= until + 1e-9;
+const isNow = ({ t: from, until }) => t >= from - ROUNDED && t <= until + ROUNDED;
 
 function draw() {
   const now = motion.events.filter(isNow);
@@ -124,7 +126,7 @@ function draw() {
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
-    const way = motion.trails[0].filter((_, i) => motion.times[i] >= from - 1e-4 && motion.times[i] <= until + 1e-4);
+    const way = motion.trails[0].filter((_, i) => motion.times[i] >= from - ROUNDED && motion.times[i] <= until + ROUNDED);
     if (status !== "plain" && way.length > 1) space.line(way, data.colours[status], 5);
   }
   for (const T of poses.map((own) => own.at(-1))) {
@@ -162,7 +164,7 @@ function sticks(poses, css, shown) {
 
 /** The axis of row `j`, whose frame is `T`, through the whole picture. */
 function singularAxis(j, T) {
-  const [middle, way] = [moved(T, data.rows[j - 1].middle), scaled(column(T, 2), 0.45 * data.size)];
+  const [middle, way] = [moved(T, data.rows[j - 1].middle), scaled(column(T, 2), 0.3 * data.size)];
   space.line([subtract(middle, way), add(middle, way)], data.colours.caution, 2.5);
   space.word(`J${j}`, add(middle, way), space.page.doubtful);
 }
@@ -183,7 +185,8 @@ function nameEnds(trail) {
   const [first, last] = [trail[0], trail.at(-1)];
   if (trail.every((point) => Math.hypot(...subtract(point, first)) < CLOSED * data.size)) return; // at rest
   const closed = Math.hypot(...subtract(last, first)) < CLOSED * data.size;
-  for (const [at, text] of closed ? [[first, words.start_and_end]] : [[first, words.start], [last, words.end]]) {
+  const arrives = whole() - end() < ROUNDED;
+  for (const [at, text] of closed ? [[first, words.start_and_end]] : [[first, words.start], ...(arrives ? [[last, words.end]] : [])]) {
     space.dot(at, space.page.ink, 4);
     space.word(text, at, space.page.ink, false);
   }
@@ -193,7 +196,7 @@ function nameEnds(trail) {
 function tell() {
   if (bar.dataset.motion !== motion.name) newMotion();
   bar.value = String(t);
-  const [at, last, said] = motion.ghosts.length > 1 ? [String(Math.floor(t) + 1), String(motion.events.length), words.solution] : [fixed(t), fixed(end()), words.clock];
+  const [at, last, said] = motion.ghosts.length > 1 ? [String(Math.floor(t) + 1), String(motion.events.length), words.solution] : [fixed(t), fixed(whole()), words.clock];
   clock.textContent = said.replace("{t}", at).replace("{end}", last);
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
@@ -203,11 +206,12 @@ function tell() {
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
-  for (const { dataset, classList } of stretches) {
-    const [from, to] = [Number(dataset.from), Number(dataset.t)];
-    classList.toggle("now", dataset.play === motion.name && t >= from - 1e-9 && t <= to + 1e-9);
+  for (const part of stretches) {
+    const [from, to] = [Number(part.dataset.from), Number(part.dataset.t)];
+    const now = part.dataset.play === motion.name && t >= from - 1e-9 && t <= to + 1e-9;
+    if (now && !part.classList.contains("now")) listed(part);
+    part.classList.toggle("now", now);
   }
-  listed();
 }
 
 /** The joints that fail at this moment, each with how gravely and what it would need; of several causes the gravest. */
@@ -247,6 +251,7 @@ function show(element, text) {
 }
 
 function newMotion() {
+  dispatchEvent(new CustomEvent("motion", { detail: motion.name }));
   bar.dataset.motion = chooser.value = motion.name;
   part("controls").classList.toggle("rests", new Set(motion.values.flat().map(String)).size === arms.length);
   Object.assign(bar, { min: String(start()), max: String(whole()), step: "any" });
@@ -300,16 +305,10 @@ function withCursors(figure) {
   };
 }
 
-/** Scrolls each listing to what is shown of it, from the start of a line on; the blank below the last one makes room for that. */
-function listed() {
-  for (const row of document.querySelectorAll(".listing .now")) {
-    const [box, table] = [row.closest(".listing"), row.closest("table")];
-    const end = row.offsetTop + row.offsetHeight;
-    if (row.offsetTop >= box.scrollTop && end <= box.scrollTop + box.clientHeight) continue;
-    const { offsetTop } = [...table.rows].find((each) => end - each.offsetTop <= box.clientHeight) ?? row;
-    table.style.marginBottom = `${Math.max(0, offsetTop + box.clientHeight - table.offsetHeight)}px`;
-    box.scrollTop = offsetTop;
-  }
+/** Scrolls a listing to the row that is shown of it: into the middle, or to its top where it has no room. */
+function listed(row) {
+  const box = row.closest(".listing");
+  if (box) box.scrollTop = row.offsetTop - Math.max(0, (box.clientHeight - row.offsetHeight) / 2);
 }
 
 /** Keeps the player in sight below what the reader points at, whose lower edge is at ``edge`` in the window. */
@@ -349,7 +348,6 @@ for (const link of document.querySelectorAll("[data-t]")) {
 addEventListener("resize", refresh);
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
-choose(decodeURIComponent(location.hash.slice(1)));
 /** Shows the moment that the query of an address asks for. */
 function answer(query) {
   if (!motions.has(query.get("play")) || !Number.isFinite(Number(query.get("t")))) return false;
@@ -367,8 +365,14 @@ document.querySelector(".hero .fix a")?.addEventListener("click", (event) => {
   place.scrollIntoView({ block: "nearest" });
   play(t < playedUntil());
 });
-if (!answer(asked) && location.hash.length < 2) goTo(...data.opened);
+const row = document.querySelector(".runs [aria-current][data-t]"); // of the page's list, if its address names one
+const named = decodeURIComponent(location.hash.slice(1));
+if (!answer(asked)) {
+  if (named !== row?.dataset.play && motions.has(named)) choose(named);
+  else goTo(...(named && row ? [row.dataset.play, Number(row.dataset.t)] : data.opened));
+}
 part("controls").hidden = part("joints").hidden = false;
+tell();
 dispatchEvent(new Event("player")); // the page has its length now
 refresh();
 performance.mark("player");

@@ -33,6 +33,7 @@ MARGIN = 0.12  # of the arm's size, around what is to be seen: links are thick
 TURNED = 0.7  # rad, by which the eye looks at arms along y from another side
 TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which the arm is seen best
 HIDDEN_COSTS, TURN_COSTS = 2.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
+WAY_COUNTS = 2.0  # in a view, to the arm: it is shorter
 FRAMED = 9  # moments of a motion that the picture holds
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
@@ -78,7 +79,8 @@ def player(
     data["opened"] = opened if opened and opened[0] in named else (shown[0].name, float(shown[0].t[0]))
     first = named[data["opened"][0]]
     robots = (robot, *beside)
-    data["turned"] = TURNED if beside else _turned(robot, [_at(first, first.q, data["opened"][1]), *first.ghosts], data)
+    q = [_at(first, first.q, data["opened"][1]), *first.ghosts]
+    data["turned"] = TURNED if beside else _turned(robot, q, forward(robot, first.q)[:, :3, 3], data)
     data |= _frame(data, robots, first)
     for own, motion in zip(data["motions"], shown):
         own |= _frame(data, robots, motion)
@@ -177,12 +179,14 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion) 
     return {"length": float(length), "target": (middle @ axes).tolist()}
 
 
-def _turned(robot: Robot, q: Sequence[Reals], data: dict[str, Any]) -> float:
-    """By how much (rad) the eye is turned to see the arm from its side, walls along them, and no body before it.
+def _turned(robot: Robot, q: Sequence[Reals], way: Reals, data: dict[str, Any]) -> float:
+    """By how much (rad) the eye is turned to see the arm and its way from the side, walls along them, and no body
+    before it.
 
     Parameters
     ----------
     q : (n,) each, rad or m, of the poses that are drawn
+    way : (N, 3), m, of the tool
     """
     joints = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
     bodies = [(_corners(shape), shape.get("large")) for shape in data["scene"] if "pale" not in shape]
@@ -194,6 +198,7 @@ def _turned(robot: Robot, q: Sequence[Reals], data: dict[str, Any]) -> float:
         axes = axes_of(AZIMUTH + turn, ELEVATION).T
         seen = points @ axes
         long = np.linalg.norm(np.diff((joints @ axes)[..., :2], axis=1), axis=2).sum() / whole
+        long += WAY_COUNTS * np.linalg.norm(np.ptp((way @ axes)[:, :2], axis=0)) / data["size"]
         hidden = np.zeros(seen.shape[:2], dtype=bool)
         for corners, large in bodies:
             own = corners @ axes

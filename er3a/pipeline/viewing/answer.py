@@ -11,7 +11,7 @@ from er3a.pipeline.language import tr
 Mark = Literal["pass", "caution", "fail", "conflict", "no_reference", "no_verdict", "none"]
 PartMark = Literal["pass", "caution", "fail", "none", "rest"]
 """Of a stretch of a bar; ``rest`` is what the bar leaves empty."""
-NARROWEST = 0.015  # of a bar, at which a moment is still seen
+NARROWEST = 0.04  # of a bar, at which a moment is still seen
 
 
 @dataclass(frozen=True)

@@ -61,11 +61,7 @@ function makeSortable(table) {
   const headers = [...table.tHead.rows[0].cells];
   headers.forEach((header, column) => {
     // No button element: browsers leave those out of a header that is repeated on the next printed sheet.
-    const control = document.createElement("span");
-    control.role = "button";
-    control.tabIndex = 0;
-    control.className = "sort";
-    control.title = WORDS.sort;
+    const control = Object.assign(document.createElement("span"), { role: "button", tabIndex: 0, className: "sort", title: WORDS.sort });
     control.append(...header.childNodes);
     header.append(control);
     const turn = () => {
@@ -121,14 +117,12 @@ function toolButton(label, action) {
 
 function enlarge(image) {
   const dialog = document.createElement("dialog");
-  dialog.className = "enlarged";
-  dialog.setAttribute("aria-label", image.alt);
+  Object.assign(dialog, { className: "enlarged", ariaLabel: image.alt, closedBy: "any" });
   const close = toolButton(WORDS.close, () => dialog.close());
   const large = image.cloneNode();
   dialog.append(close, large);
   if (large.dataset.axes) answer(large);
   dialog.addEventListener("close", () => dialog.remove());
-  dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
   document.body.append(dialog);
   dialog.showModal();
 }
@@ -302,6 +296,15 @@ function answerPointer(image, linesAt) {
   addEventListener("scroll", () => (box.hidden = true), { passive: true, capture: true });
 }
 
+// The address keeps what a reader chose, so that a reload, the way back and a link lead to it; what is empty goes.
+function keepInAddress(queries, place) {
+  const address = new URL(location.href);
+  for (const [name, value] of Object.entries(queries)) value ? address.searchParams.set(name, value) : address.searchParams.delete(name);
+  if (place) ["play", "t", "until"].forEach((name) => address.searchParams.delete(name)); // of another choice
+  if (place) address.hash = encodeURIComponent(place);
+  history.replaceState(history.state, "", address);
+}
+
 const MANY_ROWS = 12;
 
 // A field that leaves the rows in which its words stand. The address keeps them, as "?2=words" for the page's third table.
@@ -327,10 +330,7 @@ function filterFor(table) {
   box.append(field, count);
   field.addEventListener("input", () => {
     filter();
-    const address = new URL(location.href);
-    if (field.value) address.searchParams.set(number, field.value);
-    else address.searchParams.delete(number);
-    history.replaceState(null, "", address);
+    keepInAddress({ [number]: field.value });
   });
   if (field.value) {
     unfold(table); // first: Chromium leaves room for nothing in a fold that is opened after its rows were measured
@@ -438,11 +438,7 @@ function addFinder() {
   const findAnywhere = () => (places ? find() : loadPlaces().then(find));
   field.addEventListener("input", () => {
     findAnywhere();
-    const address = new URL(location.href);
-    address.searchParams.delete("at");
-    if (field.value) address.searchParams.set("find", field.value);
-    else address.searchParams.delete("find");
-    history.replaceState(null, "", address);
+    keepInAddress({ find: field.value, at: "" });
   });
   addEventListener("keydown", (event) => {
     const busy = event.target.closest?.("input, select, textarea, canvas, [contenteditable]");
@@ -451,10 +447,10 @@ function addFinder() {
     field.focus();
   });
   addEventListener("hashchange", () => {
-    if (!document.getElementById(decodeURIComponent(location.hash.slice(1)))?.closest(".unfound")) return;
+    if (!document.getElementById(addressed())?.closest(".unfound")) return;
     field.value = "";
     field.dispatchEvent(new Event("input"));
-    document.getElementById(decodeURIComponent(location.hash.slice(1))).scrollIntoView();
+    document.getElementById(addressed()).scrollIntoView();
   });
   if (!field.value) return;
   findAnywhere();
@@ -524,18 +520,11 @@ function goToPlace(main, showAll) {
   if (part) {
     showAll();
     part.dispatchEvent(new Event("beforematch"));
-    history.replaceState(null, "", `#${part.querySelector("h2").id}`); // the player takes it up
+    keepInAddress({}, part.querySelector("h2").id); // the player takes it up
     unfold(place);
   }
   place.classList.add("sought");
   place.scrollIntoView({ block: "center" });
-}
-
-// A table that goes on beyond its right edge fades there.
-function fade(box) {
-  const tell = () => box.classList.toggle("more", box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
-  box.addEventListener("scroll", tell, { passive: true });
-  new ResizeObserver(tell).observe(box);
 }
 
 // Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg" or "(10°, −20°, 300 mm, 0°)", lead to the arm in the
@@ -561,45 +550,48 @@ function linkJoints(page) {
   }
 }
 
-// Of parts that are alike, one at a time: picked by list, a link or the browser's search. A sheet of paper has all.
+// What the address names: a place on the page, or a motion.
+const addressed = () => decodeURIComponent(location.hash.slice(1));
+
+// Of parts that are alike, one at a time: picked by list, a link, the browser's search, or by the motion that is shown. A
+// sheet of paper has all.
 function showOneOf(group) {
   const parts = [...group.children];
   if (parts.length < 2) return;
-  const idOf = (part) => part.querySelector("h2").id;
-  const motionOf = (part) => idOf(part).replace(/-(solutions|clearance)$/, "");
+  const motionOf = (part) => part.querySelector("h2").dataset.motion ?? part.querySelector("h2").id.replace(/-(solutions|clearance)$/, "");
   const chooser = document.createElement("select");
-  chooser.append(...parts.map((part) => new Option(motionOf(part), idOf(part))));
-  const choose = (part) => {
-    chooser.value = idOf(part);
+  chooser.append(...parts.map((part) => new Option(motionOf(part))));
+  const show = (part) => {
+    chooser.value = motionOf(part);
     for (const other of parts) other === part ? other.removeAttribute("hidden") : other.setAttribute("hidden", "until-found");
     dispatchEvent(new Event("resize")); // for what takes its size from a part that was not there
-    dispatchEvent(new CustomEvent("chosen", { detail: chooser.value }));
+  };
+  const choose = (part) => {
+    show(part);
+    dispatchEvent(new CustomEvent("chosen", { detail: motionOf(part) }));
   };
   const label = document.createElement("label");
   label.className = "pickers";
   label.append(`${group.dataset.oneOf} `, chooser);
   group.before(label);
-  chooser.addEventListener("change", () => {
-    choose(parts[chooser.selectedIndex]);
-    history.replaceState(null, "", `#${encodeURIComponent(chooser.value)}`);
-  });
+  chooser.addEventListener("change", () => choose(parts[chooser.selectedIndex]));
   for (const part of parts) part.addEventListener("beforematch", () => choose(part));
   const follow = () => {
-    const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const aim = document.getElementById(addressed());
     const part = aim && parts.find((each) => each.contains(aim));
     if (!part) return;
     choose(part);
     aim.scrollIntoView();
   };
   addEventListener("hashchange", follow);
-  addEventListener("picked", ({ detail }) => parts.filter((part) => motionOf(part) === detail).forEach((part) => choose(part)));
-  choose(parts[0]);
+  addEventListener("motion", ({ detail }) => parts.filter((part) => motionOf(part) === detail).forEach(show));
+  show(parts[0]);
   follow();
 }
 
 // What an address leads to may be folded, or inside of what is.
 function unfoldTarget() {
-  const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  const aim = document.getElementById(addressed());
   if (!aim?.closest("details:not([open])")) return;
   unfold(aim);
   aim.scrollIntoView();
@@ -647,15 +639,9 @@ function explainTerms(terms) {
 }
 
 function explain(text, meaning) {
-  const term = document.createElement("span");
-  const tip = document.createElement("span");
-  term.className = "term";
-  term.tabIndex = 0;
-  tip.className = "tip";
-  tip.role = "tooltip";
-  tip.id = `term-${document.querySelectorAll(".tip").length}`;
-  tip.textContent = meaning;
-  tip.hidden = true;
+  const term = Object.assign(document.createElement("span"), { className: "term", tabIndex: 0 });
+  const id = `term-${document.querySelectorAll(".tip").length}`;
+  const tip = Object.assign(document.createElement("span"), { id, className: "tip", role: "tooltip", textContent: meaning, hidden: true });
   term.setAttribute("aria-describedby", tip.id);
   text.replaceWith(term);
   term.append(text);
@@ -681,7 +667,6 @@ addEventListener("hashchange", unfoldTarget);
 unfoldTarget();
 document.querySelectorAll("[data-one-of]").forEach(showOneOf);
 explainTerms(JSON.parse(document.getElementById("terms").textContent));
-document.querySelectorAll(".scroll").forEach(fade);
 
 // A sheet of paper can't be unfolded.
 addEventListener("beforeprint", () => document.querySelectorAll("details.section").forEach((details) => (details.open = true)));
@@ -754,25 +739,27 @@ const rows = [...document.querySelectorAll(".runs:not(.plain) a")];
 const fix = rows.some((row) => row.dataset.fix) && document.querySelector(".hero .fix"); // it follows the row
 const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
-  if (!fix || fix.toggleAttribute("hidden", !shown)) return;
-  const { lead, fix: advice, instead } = shown.dataset; // without advice it says what the row does: the list stays in its place
-  fix.querySelector("b").textContent = lead ?? shown.querySelector("b").textContent;
-  fix.querySelector("span").lastChild.data = ` ${advice ?? shown.querySelector("small").textContent}`;
+  if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
+  const { lead, fix: advice, instead } = shown.dataset;
+  fix.querySelector("b").textContent = lead;
+  fix.querySelector("span").lastChild.data = ` ${advice}`;
   const link = fix.querySelector("a");
   if (instead) link.href = instead;
   link.hidden = !instead || (link.hash === shown.hash && !instead.includes("?")); // nothing else is there to be shown
 };
-const pick = (row, name = decodeURIComponent(row.hash.slice(1))) => {
+// A row's own name; several may show one motion, each another moment of it.
+const nameOf = (row) => row.querySelector("b").textContent;
+const other = (row) => new URLSearchParams(row.dataset.instead?.split(/[?#]/)[1]).get("play"); // that it leads to instead
+const playing = (name) => rows.find((row) => row.dataset.play === name) ?? rows.find((row) => name && other(row) === name);
+const choose = (row, name) => {
   mark(row);
-  dispatchEvent(new CustomEvent("picked", { detail: name }));
+  keepInAddress({}, name);
 };
-for (const row of rows) row.addEventListener("click", () => pick(row));
-const played = new URLSearchParams(location.search).get("play");
-const playing = (name) => rows.find((row) => name && row.dataset.play === name);
-document.querySelector(".player .motion")?.addEventListener("change", ({ target }) => pick(playing(target.value), target.value));
-const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];
-mark(first);
-if (first && (location.hash.length < 2 || first.hash === location.hash)) pick(first);
+for (const row of rows) row.addEventListener("click", () => (row.dataset.play ? choose(row, nameOf(row)) : mark(row)));
+const named = addressed();
+mark(playing(new URLSearchParams(location.search).get("play")) ?? rows.find((row) => nameOf(row) === named || row.hash === location.hash) ?? playing(named || document.querySelector(".player")?.dataset.opened) ?? rows[0]);
+const follow = ({ detail }) => rows.some((row) => row.ariaCurrent && row.dataset.play === detail) || choose(playing(detail), detail);
+addEventListener("player", () => addEventListener("motion", follow)); // the first one is not of the reader's choice
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");

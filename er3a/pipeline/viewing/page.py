@@ -443,10 +443,11 @@ def render_stage(
         below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
         answer = replace(answer, headline=tr("Not fully checked."), rest=answer.headline, below=below)
     if head.no_verdict:
-        grey = partial(replace, mark="no_verdict", note="", parts=(), fix=None)
+        grey = partial(replace, mark="no_verdict", note="", length=0.0, fix=None)
         rows = [grey(row) for group in answer.groups for row in group.rows if row.play]
         groups = [Group(tr("Not judged"), rows)]
         answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."), groups=groups)
+        context["instead"] = alternative_table(study, stored)
     box = _tray_edges(study, stored) if STAGES[stage].obstacles else ""
     template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
     render(template, output, head.summary, answer=answer, never=never_text(stage), box=box, **framed | context)
@@ -609,19 +610,19 @@ def _commit() -> str | None:
     return commit and commit + (" + changes" if git("status", "--porcelain", "--untracked-files=no") else "")
 
 
-def alternative_table(study: Study, name: str, results: Path) -> str | None:
+def alternative_table(study: Study, stored: Stored[Any]) -> str | None:
     """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out.
 
     Parameters
     ----------
-    name : of the robot
-    results : folder of all results
+    stored : what a stage found of the robot
 
     Returns
     -------
     name : of the other robot, with a verdict of pass or caution; None where none was computed or bears out
     """
-    for other in study.other_tables(name):
+    results = stored.folder.parents[1] if stored.folder else Path()
+    for other in study.other_tables(stored.robot):
         try:
             status = read_status(results / other / "validation")
         except ResultError:

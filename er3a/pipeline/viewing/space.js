@@ -237,13 +237,14 @@ export class Space extends Orbit {
   /** The names of what is around the arm: those of `needed` in a colour of their own, then others as far as there is room. */
   names(meshes, needed = new Set()) {
     const named = meshes.filter(({ shape }) => !shape.pale || needed.has(shape.name)).sort((a, b) => needed.has(b.shape.name) - needed.has(a.shape.name));
-    const places = named.map(({ geometry, matrixWorld }) => {
-      if (!geometry.boundingSphere) geometry.computeBoundingSphere();
-      const { center, radius } = geometry.boundingSphere.clone().applyMatrix4(matrixWorld);
-      if (radius < SMALL * this.length) this.keepClear([center.toArray()], radius);
-      return center.toArray();
+    const tops = named.map(({ geometry, matrixWorld }) => {
+      if (!geometry.boundingBox) geometry.computeBoundingBox();
+      const { min, max } = geometry.boundingBox.clone().applyMatrix4(matrixWorld);
+      const [middle, radius] = [scaled(add(min.toArray(), max.toArray()), 0.5), (max.x - min.x) / 2];
+      if (max.distanceTo(min) < 4 * SMALL * this.length) this.keepClear([middle], radius);
+      return [...middle.slice(0, 2), max.z];
     });
-    named.forEach(({ shape: { name } }, k) => this.word(name, places[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name)));
+    named.forEach(({ shape: { name } }, k) => this.word(name, tops[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name)));
   }
 
   #light() {

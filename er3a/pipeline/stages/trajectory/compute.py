@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.collision.along import clearance_along
+from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.finding import Finding, fact
 from er3a.kinematics.forward import forward
@@ -64,6 +64,7 @@ class Avoided:
     chosen: StrategyName | None
     fastest_s: float | None
     rows: model.AvoidanceRows
+    clearance: model.Clearances
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,8 @@ class AvoidanceTask(MotionTask):
             results += self._planned(motion)
         ends, name = found.along.distance[[0, -1]], motion.entry.name
         margin = float(min([self.margin, *(ends[ends > 0] - ROUNDED)]))  # no more than the ends of the path have
-        met = {result.name: self._meets(result.cost, margin) for result in results if result.cost}
+        along = {result.name: self._along(result.cost.motion) for result in results if result.cost}
+        met = {each: _meets(own, margin) for each, own in along.items()}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
         chosen = best(free, meets, motion.built.duration)
@@ -116,6 +118,9 @@ class AvoidanceTask(MotionTask):
                     *(self._rows(name, each.name, each.cost.motion, each.cost) for each in results if each.cost),
                     *([self._rows(name, model.FASTEST, quickest, None)] if quickest else []),
                 ]
+            ),
+            clearance=model.Clearances.stacked(
+                [judgement.clearance_rows(name, each, own) for each, own in along.items()]
             ),
         )
 
@@ -164,21 +169,11 @@ class AvoidanceTask(MotionTask):
             StrategyResult("slow", StrategyCost(slower, 1.0, nothing, nothing, speed, acceleration, False))
         ]
 
-    def _meets(self, cost: StrategyCost, margin: float) -> tuple[Finding | None, model.MinClearance | None]:
-        """The deepest overlap on a motion, or what comes nearer than a margin (m), and its smallest clearance (None if
-        nothing can meet)."""
-        curve = cost.motion.curve
+    def _along(self, motion: Timed) -> ClearanceAlong:
+        """The clearance along a strategy's motion."""
+        curve = motion.curve
         grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
-        along = clearance_along(self.bodies, curve.joints, curve.rate_bounds, grid, grid, self.tolerance)
-        smallest = judgement.min_clearance(along)
-        if smallest is None:
-            return None, None
-        if along.contacts:
-            return fact("pair_overlaps", pair=smallest.between, depth_mm=-smallest.least_mm), smallest
-        near = smallest.least_mm < 1000 * margin
-        return fact(
-            "pair_too_near", pair=smallest.between, clearance_mm=smallest.least_mm, margin_mm=1000 * margin
-        ) if near else None, smallest
+        return clearance_along(self.bodies, curve.joints, curve.rate_bounds, grid, grid, self.tolerance)
 
     def _rows(self, path: str, strategy: str, timed: Timed, cost: StrategyCost | None) -> model.AvoidanceRows:
         """At most ROWS rows of a motion, and those of its maximum speed and deviation."""
@@ -247,6 +242,20 @@ def speed_ratio(velocity: Reals, limits: JointLimits) -> Reals:
     return ratio
 
 
+def _meets(along: ClearanceAlong, margin: float) -> tuple[Finding | None, model.MinClearance | None]:
+    """The deepest overlap on a motion, or what comes nearer than a margin (m), and its smallest clearance (None if
+    nothing can meet)."""
+    smallest = judgement.min_clearance(along)
+    if smallest is None:
+        return None, None
+    if along.contacts:
+        return fact("pair_overlaps", pair=smallest.between, depth_mm=-smallest.least_mm), smallest
+    near = smallest.least_mm < 1000 * margin
+    return fact(
+        "pair_too_near", pair=smallest.between, clearance_mm=smallest.least_mm, margin_mm=1000 * margin
+    ) if near else None, smallest
+
+
 def _quickest(segment: SingularSegment) -> Timed | None:
     if np.isnan(segment.q[:, 0]).any() or segment.followed.jumps:
         return None
@@ -278,8 +287,7 @@ def _motion(robot: Robot, cost: StrategyCost, clearance: model.MinClearance | No
         joint_swing_deg=tuple(shown(robot, np.ptp(cost.motion.q, axis=0)).tolist()),
         max_joint_speed=np.abs(cost.motion.velocity).max(axis=0),
         max_joint_acceleration=np.abs(cost.motion.acceleration).max(axis=0),
-        clearance_mm=clearance.least_mm if clearance else None,
-        clearance_between=clearance.between if clearance else None,
+        clearance=clearance,
     )
 
 
@@ -407,7 +415,8 @@ def _judged(
     close = near_assumed_shapes(robot, each.name, path.clearance, assumed_margin)
     asked = settings.programs, settings.write_unsafe
     programs = program_files(robot, motion, path.verdict, *asked, near=close, repaired=repair, speed=limits.speed)
-    return JudgedPath(path, checks, judgement.clearance_rows(each.name, found.along), avoided.rows, programs)
+    clearance = model.Clearances.stacked([judgement.clearance_rows(each.name, "", found.along), avoided.clearance])
+    return JudgedPath(path, checks, clearance, avoided.rows, programs)
 
 
 def compute(study: Study, name: str) -> model.TrajectoryResults:

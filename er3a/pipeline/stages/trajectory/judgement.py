@@ -360,16 +360,19 @@ def advised_end(path: model.PathSummary, rows: model.PathChecks, limits: model.L
     )
 
 
-def clearance_rows(name: str, along: ClearanceAlong) -> model.Clearances:
+def clearance_rows(name: str, strategy: str, along: ClearanceAlong) -> model.Clearances:
     """One row for each time at which the clearance was measured in full.
 
     Parameters
     ----------
     name : of the path
+    strategy : that the motion follows; empty for the path as programmed
 
     Returns
     -------
     rows : s and mm; NaN where the path can't be reached
     """
     between = [label_of(pair) if pair else "" for pair in along.pair]
-    return model.Clearances.of(path=name, t_s=along.t, clearance_mm=along.distance * 1000, between=between)
+    return model.Clearances.of(
+        path=name, strategy=strategy, t_s=along.t, clearance_mm=along.distance * 1000, between=between
+    )

@@ -162,7 +162,7 @@ class StrategyMotion:
     done_ratio : how much of the path is done, 0..1
     keeps_clear : whether the arm keeps its distance from singular poses wherever the tool is on or beside the path
     joint_swing_deg : between the extremes of each joint; mm where it slides
-    clearance_mm, clearance_between : smallest, and of which bodies; None where none was measured
+    clearance : None where none was measured
     """
 
     done_ratio: float
@@ -175,8 +175,7 @@ class StrategyMotion:
     max_joint_speed_ratio: float
     max_joint_acceleration_deg_s2: tuple[float, ...]
     max_joint_acceleration_ratio: float
-    clearance_mm: float | None
-    clearance_between: Pair | None
+    clearance: MinClearance | None
 
 
 @dataclass(frozen=True)
@@ -388,10 +387,11 @@ class PathChecks(Samples):
 
 
 class Clearances(Table):
-    """Times at which the clearance was measured in full; NaN where the path can't be reached."""
+    """Times at which the clearance of paths and strategies was measured in full; NaN where a path can't be reached."""
 
     path: Texts = column("name of the path")
-    t_s: Reals = column("time since the path's start", heading=N_("time"))
+    strategy: Texts = column("the strategy; empty for the path as programmed")
+    t_s: Reals = column("time since the motion's start", heading=N_("time"))
     clearance_mm: Reals = column("smallest distance, negative by the depth of an overlap", heading=N_("clearance"))
     between: Texts = column("the two bodies nearest to each other")
 

@@ -16,6 +16,7 @@ from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
+from er3a.pipeline.player.motions import fix_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.player.turning import Layer, surroundings, turning_figure
 from er3a.pipeline.results import Stored, is_computed, read_stage
@@ -24,7 +25,7 @@ from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, all_caught
 from er3a.pipeline.viewing.page import render_stage
 from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
@@ -68,7 +69,12 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         never_met=int((results.matrix.state == "never").sum()),
         tried=TRIED,
         places=_places(robot, results, scene),
-        player=player(robot, [*motions(robot, results), *poses(robot, results)], scene, opened=worst),
+        player=player(
+            robot,
+            [*motions(robot, results), *poses(robot, results)],
+            scene,
+            opened=worst,
+        ),
         drawing_head=drawing_head(),
         home=_angles(robot, np.array(summary.home_deg or ())),
         home_from=word("collision.home", HOMES, summary.home_from),
@@ -86,30 +92,29 @@ def _answer(
     What collides as its file expects is named, and so is a path of which only a part was measured: that is clear of
     nothing. ``unreached``: these; ``advice``: what may be run instead of a path, by its name.
     """
-    found = {figure.name: figure.value for figure in summary.figures}
-    free, params = found.get("free_of_collisions"), summary.verdict.finding.params
+    params = summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
-    most = max((abs(each.clearance_mm) for each in closest), default=1.0)
+    most = max((each.clearance_mm for each in closest), default=1.0)
     rows = [_row(each, unreached, near, advice, most) for each in closest]
     hit, clear, partly = (
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
     counted = (
-        (N_("{count} collide as expected."), len(params.get("demonstrations", ()))),
         (N_("{count} can't be reached whole."), len(partly)),
         (N_("{count} targets collide in every solution."), blocked := len(params.get("blocked", ()))),
     )
-    due = len(rows) + blocked
-    keys = [(with_unit(fixed(1000 * summary.places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
-    if free is not None:
-        keys.insert(0, (with_unit(fixed(float(free), 0), "%"), tr("of joint space is free")))
+    caught = len(params.get("demonstrations", ()))
+    due = len(rows) + blocked - caught - len(partly)
     least = next((each for each in closest if each.clearance_mm >= 0), None)
-    if least:
-        keys.insert(0, (with_unit(fixed(least.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=least.name)))
+    keys = (
+        [(with_unit(fixed(least.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=least.name))]
+        if least
+        else []
+    )
     titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
     return Answer(
         tr("{count} of {due} cases are clear.", count=len(clear), due=due) if due else tr("Collisions checked."),
-        "",
+        all_caught(caught),
         joined([tr(text, count=count) for text, count in counted if count], " "),
         keys,
         [Group(title, own[:MAX_ROWS]) for title, own in titled],
@@ -129,7 +134,7 @@ def _advice(folder: Path | None) -> dict[str, Fix]:
     if paths is None or not is_computed(paths):
         return {}
     found = faults(read_stage(paths, STAGES["trajectory"]).results)
-    return {fault.name: Fix(*fault.instead) for fault in found if fault.instead}
+    return {fault.name: fix for fault in found if fault.instead and (fix := fix_of([fault]))}
 
 
 def _row(
@@ -142,17 +147,16 @@ def _row(
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
     which only a part was measured.
 
-    The bar is the clearance, or in red the overlap, in parts of ``most_mm``."""
+    The bar is the clearance in parts of ``most_mm``."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     of_path = found.kind == "path"
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     if of_path and found.name in unreached and mark != "fail":
         mark = "none"
-    bar = [Part(0.0, 1.0, mark)] if mark in ("fail", "none") else []
+    bar = [Part(0.0, 1.0, mark)] if mark == "none" else []
     fix = advice.get(found.name) if mark == "fail" and of_path else None
-    return ListRow(
-        mark, found.name, note, "", (found.name, found.t_s or 0.0), abs(found.clearance_mm) / most_mm, bar, fix
-    )
+    length = max(0.0, found.clearance_mm) / most_mm
+    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, bar, fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
 
 from er3a.collision.pairs import names_of
-from er3a.finding import Finding, is_one
-from er3a.pipeline.language import own_title, tr
-from er3a.pipeline.messages.expectations import as_expected, outcome_word
+from er3a.finding import Finding, fact, is_one
+from er3a.pipeline.language import tr
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import times_needed
-from er3a.pipeline.messages.programs import rates_text, remedies, singular_cause
+from er3a.pipeline.messages.programs import OUT_OF_REACH, rates_text, remedies, singular_cause
 from er3a.pipeline.messages.say import joined, say, say_first
 from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of, at_rest
 from er3a.pipeline.stages.expectations import is_met
@@ -36,7 +36,7 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     too fast together, bodies that touch each from its own. ``q`` is (N, n), rad or m.
     """
     motions = []
-    for program in worst_first(results.summary.programs):
+    for program in worst_first(results):
         rows = results.motion.take(results.motion.program == program.name)
         events = [PlayedEvent(t0, t1, tr("line {line}", line=line), "plain") for line, _, t0, t1 in stretches(rows)]
         for each in sorted(program.findings, key=cause_first):
@@ -107,16 +107,30 @@ def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
     )
 
 
-def worst_first(programs: Sequence[ProgramSummary]) -> list[ProgramSummary]:
-    """Those that fail first, of them those that were not expected to."""
+def worst_first(results: ProgramsResults) -> list[ProgramSummary]:
+    """Programs with what was found: those that fail first, of them those that were not expected to."""
+    programs = [
+        replace(program, findings=tuple(_of_passes(results, program, each) for each in program.findings))
+        for program in results.summary.programs
+    ]
     return sorted(programs, key=lambda each: (-RANKS[each.outcome], is_met(each)))
+
+
+def _of_passes(results: ProgramsResults, program: ProgramSummary, found: FindingAt) -> FindingAt:
+    """A finding; of what is out of reach in fewer passes than its line has, in a loop that drifts, that."""
+    short = [each for each in _same_line(program, found) if is_one(each.finding, *OUT_OF_REACH)]
+    rows = results.instructions
+    own = (rows.program == program.name) & (rows.line == found.line) & (Path(program.file).name == found.file)
+    if found not in short or sum(each.times for each in short) >= rows.times[own].sum():
+        return found
+    return replace(found, finding=fact("later_out_of_reach", reasons=found.finding.reasons))
 
 
 def faults(results: ProgramsResults) -> list[Fault]:
     """The programs that may not be run as they are, the worst first: of each the first finding of the gravest level,
     and what comes before it."""
     found = []
-    for program in worst_first(results.summary.programs):
+    for program in worst_first(results):
         wrong = sorted((each for each in program.findings if WEIGHTS[each.level] != "plain"), key=moment_of)
         if not wrong or program.outcome == "pass":
             continue
@@ -127,25 +141,16 @@ def faults(results: ProgramsResults) -> list[Fault]:
         found.append(
             Fault(
                 program.name,
-                own_title(program.title),
                 WEIGHTS[program.outcome],
                 outcome_word(program.outcome),
                 is_met(program),
-                as_expected(program),
                 moments,
-                " ".join(dict.fromkeys(text for each in shown for text in _advice(results, program, each)[:1])),
+                " ".join(dict.fromkeys(text for each in shown for text in remedies(_same_line(program, each))[:1])),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
                 cause=cause,
             )
         )
     return found
-
-
-def _advice(results: ProgramsResults, program: ProgramSummary, found: FindingAt) -> list[str]:
-    """What to do about the line of a finding."""
-    rows = results.instructions
-    own = (rows.program == program.name) & (rows.line == found.line) & (Path(program.file).name == found.file)
-    return remedies(_same_line(program, found), int(rows.times[own].sum()))
 
 
 def _cause(program: ProgramSummary, found: FindingAt) -> str:

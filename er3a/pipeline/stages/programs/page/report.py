@@ -33,7 +33,7 @@ from er3a.pipeline.stages.programs.page.played import (
 )
 from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, ListRow, judged, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, ListRow, judged, may_run
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
@@ -47,8 +47,8 @@ AROUND = 3  # lines around those with motions or findings, in a longer listing
 def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) -> None:
     """Write the page of a robot's programs."""
     robot, results = study.robot(stored.robot), stored.results
-    summary, scene = results.summary, study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
-    sections = [_section(results, program) for program in worst_first(summary.programs)]
+    scene = study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
+    sections = [_section(results, program) for program in worst_first(results)]
     wrong, played = faults(results), motions(robot, results)
     render_stage(
         study,
@@ -69,10 +69,7 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     """How many programs may be run, each with its bar over time, and what to do about the first of the others."""
     summary, wrong = results.summary, faults(results)
     shown = {motion.name: motion for motion in motions(robot, results)}
-    notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
-    moved = [each for each in shown if (results.motion.program == each).any()]
-    bars = dict(zip(moved, lengths(float(shown[each].t[-1]) for each in moved)))
-    bad = {each.name: row_of(each, shown[each.name], 0.0, bars.get(each.name, 0.0), notes[each.name]) for each in wrong}
+    bad = {each.name: row_of(each, shown[each.name], note=in_few_words(each.moments[0].what)) for each in wrong}
     good = [each for each in summary.programs if each.name not in bad]
     sound = [
         ListRow(
@@ -81,7 +78,7 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
             _cost(float(shown[each.name].t[-1]), each.least_clearance_mm),
             f"#{each.name}",
             (each.name, 0.0),
-            bars.get(each.name, 0.0),
+            1.0,
         )
         for each in good
     ]
@@ -183,11 +180,9 @@ def _listing(
                 text=words,
                 level=level,
                 word=level and level_word(level),
-                remarks=[
-                    (re.split("[;；]", say(each.finding))[0], _remark(name, each))
-                    for each in sorted(here, key=cause_first)
-                ],
-                remedies=remedies(here, int(rows.times[moves[number]].sum())),
+                brief=here and re.split("[;；]", say(min(here, key=weight).finding))[0],
+                remarks=[_remark(name, each) for each in sorted(here, key=cause_first)],
+                remedies=remedies(here),
                 facts=_facts(rows, moves[number]),
                 stretch=leads[0],
                 moment=leads[1],

@@ -60,32 +60,38 @@ def path_picture(
     return Picture(figure, alt, caption, [(ax, path.name) for ax in figure.axes])
 
 
-def nearness_picture(path: model.PathSummary, rows: model.Clearances, shapes: Finding | None) -> Picture:
-    """How near the arm comes to anything, over the time of its motion, with what it must not come below.
+def nearness_picture(
+    name: str,
+    least: model.MinClearance,
+    rows: model.Clearances,
+    shapes: Finding | None,
+    path: model.PathSummary | None = None,
+) -> Picture:
+    """How near the arm comes to anything, over the time of a motion, with what it must not come below.
 
     Parameters
     ----------
-    rows : of the path
+    rows : of the motion
     shapes : the assumed ones, which may be wrong by their margin; None where none are assumed
+    path : whose faults are marked; None of a motion that repairs them
     """
-    figure, ax = new_figure(width=5.2, height=2.3)
+    figure, ax = new_figure(width=5.2, height=2.6)
     ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
-    _mark(ax, path)
+    if path:
+        _mark(ax, path)
     ax.axhline(0.0, color=palette.TOUCHING, linewidth=1.2)
     if shapes:
         margin = shapes.margin_mm
         text = tr("assumed shapes may be off by {mm:g} mm", mm=margin)
         ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.25, linewidth=0, label=text)
         ax.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, handlelength=1.2)
-    caption = ""
-    if least := path.clearance:
-        far, at = fixed(least.least_mm, 1), fixed(least.t_s, 2)
-        ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
-        caption = tr("Least: {far} mm at {t} s, {pair}.", far=far, t=at, pair=say(least.between))
-    ax.set_xlim(0.0, path.duration_s)
+    far, at = fixed(least.least_mm, 1), fixed(least.t_s, 2)
+    ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
+    caption = tr("Least: {far} mm at {t} s, {pair}.", far=far, t=at, pair=say(least.between))
+    ax.set_xlim(0.0, rows.t_s[-1])
     ax.set_xlabel(axis_label(rows, "t_s"))
     ax.set_ylabel(axis_label(rows, "clearance_mm"))
-    return Picture(figure, tr("{path}: how near it comes", path=path.name), caption, [(ax, path.name)])
+    return Picture(figure, tr("{path}: how near it comes", path=name), caption, [(ax, name)])
 
 
 def _axes(figure: Figure, row: int) -> Axes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -10,8 +11,8 @@ import numpy as np
 from er3a.collision.pairs import names_of
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import own_title, tr
-from er3a.pipeline.messages.expectations import as_expected, outcome_word
+from er3a.pipeline.language import tr
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import rate_needed, times_needed
 from er3a.pipeline.messages.programs import remedies
@@ -105,11 +106,9 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
         found.append(
             Fault(
                 path.name,
-                own_title(path.title),
                 status,
                 verdict,
                 path.verdict != "safe" and is_met(path),
-                as_expected(path),
                 moments,
                 to_do,
                 address_of("trajectory", path.name, moments[0].seen_s or 0.0, path.name),
@@ -284,17 +283,17 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
 
 
 def _few_words(part: model.Stretch) -> str:
-    """Why a stretch is an event; of bodies that overlap the first two."""
+    """Why a stretch is an event, up to where its details begin; of bodies that overlap the first two."""
     if is_one(part.cause, "bodies_overlap"):
         return say(part.cause.touches[0].pair)
-    return rate_needed(part.cause) if is_one(part.cause, *RATES) else cause_text(part)
+    return rate_needed(part.cause) if is_one(part.cause, *RATES) else re.split(" ?[;(；（]", cause_text(part))[0]
 
 
 def _near_events(path: model.PathSummary, near: Finding | None, clearance: model.Clearances) -> list[PlayedEvent]:
     """From when to when a path is as near to assumed shapes as these may be wrong, at its nearest."""
     if near is None or path.clearance is None:
         return []
-    rows = clearance.take(clearance.path == path.name)
+    rows = clearance.take((clearance.path == path.name) & (clearance.strategy == ""))
     at = path.clearance.t_s
     far = rows.t_s[~(rows.clearance_mm < near.margin_mm)]
     start = min(rows.t_s[rows.t_s > max(far[far < at], default=-np.inf)], default=at)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from er3a.collision.pairs import Pair
 from er3a.pipeline.language import tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
@@ -40,7 +39,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, ListRow, judged, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, ListRow, judged, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
@@ -61,16 +60,15 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
     lines = program_head(stored.validated, summary.checked, summary.assumed)
     met = None if contradicted else met_in_tray(study, stored)
-    wrong = _by_name(results)
+    wrong = {} if contradicted else _by_name(results)
     trays = {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in (met or {}).items()}
     played = motions(robot, results, trays)
-    for i, path in enumerate(paths):
+    for i, path in enumerate(() if contradicted else paths):
         rows = checks.take(checks.path == path.name)
-        files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
+        files = results.programs.take((results.programs.path == path.name) & (i < count))
         links = _programs(path, files, lines, met or {})
         drawn = _figure(robot, path, rows, summary.near) if i < count else None
-        measured = results.clearance.take(results.clearance.path == path.name)
-        nearness = nearness_picture(path, measured, summary.verdict.shapes) if i < count and path.clearance else None
+        nearness = _nearness(path, results) if i < count else []
         sections.append({**_section(path, drawn, links, summary), "near_over_time": nearness})
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
@@ -84,7 +82,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         faults=wrong,
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
-        contradicted=contradicted,
         drawn_paths=count,
         player=player(robot, played, scene, opened=opened(wrong.values())),
         drawing_head=drawing_head(),
@@ -116,40 +113,36 @@ def answer_of(
     met = met or {}
     motions, known = {motion.name: motion for motion in played}, {path.name: path for path in summary.paths}
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
-    shares = dict(zip((path.name for path in paths), lengths(path.duration_s for path in paths)))
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
     faulty, others = paths[: len(wrong)], paths[len(wrong) :]
     fault_rows = {}
     for path in faulty:
-        row = row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
+        row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
         fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
     repairable = [fault_rows[path.name] for path in faulty if path.chosen and path.name not in hindered]
-    limits = summary.joint_limits
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
-        replace(_sound_row(path, shares[path.name], limits), mark="fail", note=as_expected(path), fix=None)
+        replace(_sound_row(path), mark="fail", note=as_expected(path))
         for path in others
         if path.expect and not is_met(path)
     ]
     rows = [*unlike, *(row for row in fault_rows.values() if row not in repairable)]
-    groups = judged([*rows, *(_sound_row(path, shares[path.name], limits) for path in sound)], repairable)
+    groups = judged([*rows, *map(_sound_row, sound)], repairable)
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
     speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
-    limit = tr("of assumed speed limits") if any(limits.speed_assumed) else tr("of a joint's speed limit")
+    limit = tr("of assumed speed limits") if any(summary.joint_limits.speed_assumed) else tr("of a joint's speed limit")
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), limit)] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
     return Answer(headline, rest, "", keys, groups, fix)
 
 
-def _sound_row(path: model.PathSummary, length: float, limits: model.LimitsUsed) -> ListRow:
-    """A path that may be run, with how near it comes to anything, and the joint speed that is nearest to its limit."""
+def _sound_row(path: model.PathSummary) -> ListRow:
+    """A path that may be run, with how near it comes to anything."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    rate = tr("joint speed nearest its limit (°/s)")
-    said = Fix(f"{path.name}: {rate}: {_speed(path, limits)}; {_clear_of(path) or '–'}", f"#{path.name}")
-    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length, fix=said)
+    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), 1.0)
 
 
 def _programs(
@@ -215,6 +208,18 @@ def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks, near:
     return path_picture(robot, path, _drawn(path, rows), near, alt, whole_sentence(text))
 
 
+def _nearness(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:
+    """Of a path, and of the motion that repairs it: its name, and how near it comes over time."""
+    rows, shapes = results.clearance.take(results.clearance.path == path.name), results.summary.verdict.shapes
+    motion = path.chosen and path.chosen.motion
+    shown = [(path.name, "", path.clearance, path), (repaired(path), path.strategy, motion and motion.clearance, None)]
+    return [
+        (name, nearness_picture(name, least, rows.take(rows.strategy == strategy), shapes, faulty))
+        for name, strategy, least, faulty in shown
+        if least
+    ]
+
+
 def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
     """The rows that a curve needs: evenly spread ones, those at singular poses, and the maximum speeds."""
     even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
@@ -228,7 +233,6 @@ def strategies_shown(path: model.PathSummary) -> list[list[str]]:
     """Rows of the comparison: the programme, and each strategy."""
     if not path.avoidance:
         return []
-    clearance = _clearance(path.clearance.least_mm, path.clearance.between) if path.clearance else "–"
     rows = [
         [
             tr("as programmed"),
@@ -236,7 +240,7 @@ def strategies_shown(path: model.PathSummary) -> list[list[str]]:
             "0.00",
             _ratio(path.max_joint_speed_ratio),
             _ratio(path.max_joint_acceleration_ratio),
-            clearance,
+            _clearance(path.clearance),
             fixed(path.duration_s, 2),
             tr("the path to be repaired"),
         ]
@@ -256,13 +260,13 @@ def _costs(motion: model.StrategyMotion) -> list[str]:
         fixed(motion.max_deviation_deg, 2),
         _ratio(motion.max_joint_speed_ratio),
         _ratio(motion.max_joint_acceleration_ratio),
-        _clearance(motion.clearance_mm, motion.clearance_between),
+        _clearance(motion.clearance),
         fixed(motion.duration_s, 2),
     ]
 
 
-def _clearance(value: float | None, pair: Pair | None) -> str:
-    return "–" if value is None or pair is None else bracketed(fixed(value, 0), say(pair))
+def _clearance(found: model.MinClearance | None) -> str:
+    return bracketed(fixed(found.least_mm, 0), say(found.between)) if found else "–"
 
 
 def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:
