@@ -31,7 +31,7 @@ from er3a.calibration.parameters import (
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
 from er3a.comparison.entries import BASE_COLUMNS, Entry, entry_twists
 from er3a.finding import Finding, fact
-from er3a.geometry.transforms import nearest_rotations, posed, rpy_of, transposed
+from er3a.geometry.transforms import nearest_rotations, posed, rpy_of, skew, transposed
 from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
@@ -95,20 +95,22 @@ def jacobian(
     J : (n, p), mm per m or rad, and mrad of orientations; small turns count, however far these are from measured ones
     """
     amounts = np.broadcast_to(amounts, len(parameters))
-    here, of_rows = corrected(robot, parameters, amounts), np.array([bool(each.joint) for each in parameters])
+    here = corrected(robot, parameters, amounts) if amounts.any() else robot
+    of_rows = np.array([bool(each.joint) for each in parameters], dtype=bool)
     xyz, turns = observations.positions(here), observations.turns(here)
     xyz = observations.gathered(xyz) if gathered else xyz
     rows = [each for each in parameters if each.joint]
     shifts = np.empty((len(xyz), 6, len(parameters)))
     shifts[..., of_rows] = entry_twists(tables_of(here), here, observations.row_values, rows, xyz)
     by_tool = np.where(observations.on_tool[:, None, None], turns, 0.0)
-    for k in np.flatnonzero(~of_rows).tolist():
-        along, about = placing_axes(parameters[k], parameters, amounts)
-        if parameters[k].column in BASE_COLUMNS:
-            along, about = robot.base[:3, :3] @ along, robot.base[:3, :3] @ about
-            shifts[:, :3, k], shifts[:, 3:, k] = along + np.cross(about, xyz - here.base[:3, 3]), about
-        else:
-            shifts[:, :3, k], shifts[:, 3:, k] = by_tool @ along, by_tool @ robot.tool[:3, :3] @ about
+    if not of_rows.all():
+        along, about = placing_axes(parameters, amounts)
+        of_base = np.array([each.column in BASE_COLUMNS for each in parameters])
+        of_tool, lever = ~of_rows & ~of_base, skew(xyz - here.base[:3, 3])
+        by_base, turned = (robot.base[:3, :3] @ each[of_base].T for each in (along, about))
+        shifts[:, :3, of_base], shifts[:, 3:, of_base] = by_base - lever @ turned, turned
+        shifts[:, :3, of_tool] = by_tool @ along[of_tool].T
+        shifts[:, 3:, of_tool] = by_tool @ robot.tool[:3, :3] @ about[of_tool].T
     return MM * observations.relative_shift(shifts, xyz)[observations.seen]
 
 

@@ -211,7 +211,7 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
     misread = (at_all.by_row > 9.0 * noise**2 * whole.dimensions) & explained
     if misread.any() and "reading" not in layers:
         layers = ("reading", *layers)
-    sd = whole.expected(final)
+    sd = whole.expected(at_all)
     places, (entries, small) = _places(final), _entries(robot, final)
     unseen, taken_up = _unseen(fitter, final) if explained else ((), ())
     return Confirmation(
@@ -226,10 +226,10 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
         entries=entries,
         small=small,
         corrected=_corrected(robot, final, len(pairs)),
-        left_mm=MM * np.linalg.norm(at_all.off[:, :3], axis=1),
-        left_deg=np.degrees(np.linalg.norm(at_all.off[:, 3:], axis=1)),
-        before_mm=MM * np.linalg.norm(before.off[:, :3], axis=1),
-        before_deg=np.degrees(np.linalg.norm(before.off[:, 3:], axis=1)),
+        left_mm=MM * np.linalg.norm(at_all.left[:, :3], axis=1),
+        left_deg=np.degrees(np.linalg.norm(at_all.left[:, 3:], axis=1)),
+        before_mm=MM * np.linalg.norm(before.left[:, :3], axis=1),
+        before_deg=np.degrees(np.linalg.norm(before.left[:, 3:], axis=1)),
         digits_mm=MM * sd[0],
         digits_deg=float(np.degrees(sd[1])),
         fits=~misread,
@@ -274,7 +274,7 @@ def _places(solution: Solution) -> dict[str, Placed | None]:
     """Base and tool with their intervals, as far as they were fitted."""
     errors, found = INTERVAL_95 * solution.errors, solution.explanation
     placed: dict[str, Placed | None] = {"base": None, "tool": None}
-    for name, T in (("base", solution.Y), ("tool", solution.X)):
+    for name, T in (("base", solution.arm.base), ("tool", solution.arm.tool)):
         if name in found.free:
             size = min(6, len(errors) - len(solution.entries)) if name == "tool" else 6
             own, errors = errors[:size], errors[size:]
@@ -319,7 +319,7 @@ def _corrected(robot: Robot, solution: Solution, count: int) -> Robot:
             own = np.eye(robot.joints) if robot.coupling is None else robot.coupling
             found = found.replace(coupling=own @ factors)
     if solution.explanation.free:
-        found = found.replace(base=solution.Y, tool=solution.X)
+        found = found.replace(base=solution.arm.base, tool=solution.arm.tool)
     if not (solution.entries or solution.explanation.free or solution.explanation.joints.faults):
         return found
     source = Source(f"Fitted to {count} poses of the controller, starting from {robot.name}", "inferred")
@@ -338,7 +338,7 @@ def _held_out(fitter: Fitter, solution: Solution) -> float | None:
         weights = solution.rows.astype(float)
         weights[out] = 0.0
         left = fitter.fit(solution.explanation, solution.values, weights)
-        squares += (left.off[out, :3] ** 2).sum(axis=1).tolist()
+        squares += (left.left[out, :3] ** 2).sum(axis=1).tolist()
     return float(MM * np.sqrt(np.mean(squares)))
 
 

@@ -173,7 +173,7 @@ def _with_frames(found: Attempts, near: Near) -> Iterator[tuple[Solution, Soluti
     unit."""
     fitter = found.fitter
     robot, pairs = fitter.robot, fitter.pairs
-    F = fitter.flanges([near.joints])[0, 0]
+    F = fitter.flanges([near.joints])[0]
     for factor in _factors(near):
         for free in PLACES:
             Y, X = near.Y, near.X
@@ -226,7 +226,7 @@ def _with_entries(found: Attempts, states: Iterable[Solution]) -> list[Solution]
             if len(entries) <= MOST:
                 explanation = replace(state.explanation, entries=entries)
                 amounts = np.concatenate([state.amounts[: len(state.explanation.entries)], np.zeros(len(more))])
-                reached.append(_with_fewer_frames(found, found.add(explanation, (state.Y, state.X, amounts))))
+                reached.append(_with_fewer_frames(found, found.add(explanation, (state.arm.base, state.arm.tool, amounts))))
     return sorted(reached, key=lambda each: each.chi2)[:STATES]
 
 
@@ -236,7 +236,7 @@ def _with_fewer_frames(found: Attempts, solution: Solution) -> Solution:
     if solution.per_freedom > EXPLAINED:
         return solution
     for free in PLACES[: 3 if solution.explanation.free == BOTH else 0]:
-        Y, X = solution.Y if "base" in free else robot.base, solution.X if "tool" in free else robot.tool
+        Y, X = solution.arm.base if "base" in free else robot.base, solution.arm.tool if "tool" in free else robot.tool
         found.add(replace(solution.explanation, free=free), (Y, X, solution.amounts))
     return solution
 
@@ -281,7 +281,7 @@ def _released(found: Attempts, solution: Solution, k: int) -> Solution:
     own = solution.explanation.entries
     order = [*range(len(own)), k, *(i for i in range(len(own), len(solution.amounts)) if i != k)]
     explanation = replace(solution.explanation, entries=(*own, solution.entries[k]))
-    return found.add(explanation, (solution.Y, solution.X, solution.amounts[order]))
+    return found.add(explanation, (solution.arm.base, solution.arm.tool, solution.amounts[order]))
 
 
 def _with_fewer_entries(found: Attempts, solution: Solution) -> None:
@@ -290,8 +290,8 @@ def _with_fewer_entries(found: Attempts, solution: Solution) -> None:
     if not own:
         return
     alone = replace(solution.explanation, small=False)
-    _with_fewer_frames(found, found.add(alone, (solution.Y, solution.X, solution.amounts[: len(own)])))
+    _with_fewer_frames(found, found.add(alone, (solution.arm.base, solution.arm.tool, solution.amounts[: len(own)])))
     for entry in own:
         kept = [k for k in range(len(own)) if own[k] != entry]
         explanation = replace(solution.explanation, entries=tuple(own[k] for k in kept))
-        found.add(explanation, (solution.Y, solution.X, solution.amounts[kept]))
+        found.add(explanation, (solution.arm.base, solution.arm.tool, solution.amounts[kept]))

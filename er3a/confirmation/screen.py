@@ -153,7 +153,7 @@ def nearest(fitter: Fitter, readings: Sequence[JointReading], forms: Sequence[st
 
 def _products(fitter: Fitter, readings: Sequence[JointReading], form: str) -> tuple[Reals, Reals]:
     """The matrices (H, 9, 9) of the bilinear forms, and the flanges."""
-    F, C = fitter.flanges(readings)[0], fitter.pairs.turns[form]
+    F, C = fitter.flanges(readings), fitter.pairs.turns[form]
     K = C.reshape(-1, 9).T @ F[..., :3, :3].reshape(*F.shape[:2], 9)  # (H, ab, cd)
     K = K.reshape(-1, 3, 3, 3, 3).transpose(0, 1, 3, 4, 2).reshape(-1, 9, 9)  # (a, c), (d, b)
     return K / len(C), F
@@ -182,7 +182,7 @@ def _positions_alone(fitter: Fitter, readings: Sequence[JointReading]) -> list[N
     found = []
     for first in range(0, len(readings), BLOCK):
         some = readings[first : first + BLOCK]
-        F, m = fitter.flanges(some)[0], fitter.pairs.xyz
+        F, m = fitter.flanges(some), fitter.pairs.xyz
         by_place = np.einsum("ij,nk->nijk", np.eye(3), m).reshape(len(m), 3, 9)
         by_place = np.broadcast_to(by_place, (len(F), *by_place.shape))
         shift = np.broadcast_to(np.eye(3), F[..., :3, :3].shape)
