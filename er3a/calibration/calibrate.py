@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
+from er3a.by_value import ByValue, Displayed
 from er3a.calibration import outcomes
 from er3a.calibration.cross_validation import (
     ChosenTerms,
@@ -34,7 +34,6 @@ from er3a.calibration.fit import (
     ROUNDING,
     Fit,
     Subspace,
-    covariance_by_poses,
     fit,
     held_with,
     jacobian,
@@ -67,6 +66,7 @@ from er3a.calibration.terms import (
 from er3a.comparison.entries import Entry
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.clustered import clustered_covariance
 from er3a.references.quantities import MM
 from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
@@ -404,24 +404,6 @@ class Calibration(ByValue, Displayed):
         """
         return self.model.distances_mm(measurements)
 
-    def sheet(self) -> Sheet:
-        """What the notebook shows: a row for each estimated entry, in mm and deg, with its 95 % interval.
-
-        Returns
-        -------
-        sheet : with the conclusion, and why other entries were held
-        """
-        rows = ((each.name, each.nominal, each.correction, each.half_width, each.unit) for each in self.estimates)
-        shown, left = first_rows(rows, len(self.estimates))
-        rms = f"rms {shortly(self.rms_before_mm)} -> {shortly(self.rms_after_mm)} mm"
-        return Sheet(
-            f"Calibration of {self.robot.name} with {self.coordinates} coordinates at {self.poses} poses: {rms}",
-            ("entry", "nominal", "correction", "+-95 %", "unit"),
-            shown,
-            left,
-            (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
-        )
-
 
 def calibrate(
     robot: Robot,
@@ -519,7 +501,8 @@ def _covariance_by_noise(observations: PointObservations, found: Fit) -> tuple[R
     if found.freedom < max(FEW_SPARE, found.J.shape[1]):
         quantile = float(scipy.special.stdtrit(found.freedom, 0.975))
         return found.scatter**2 * found.covariance, np.full(found.J.shape[1], quantile)
-    covariance, freedom = covariance_by_poses(found, observations.same_pose[observations.pose_of[found.last]])
+    pose_of = observations.same_pose[observations.pose_of[found.last]]
+    covariance, freedom = clustered_covariance(found.J, found.rest, found.covariance, pose_of)
     return covariance, np.asarray(scipy.special.stdtrit(freedom, 0.975))
 
 

@@ -6,8 +6,6 @@ References
 ----------
 .. [1] J. M. Hollerbach, C. W. Wampler, "The calibration index and taxonomy for robot kinematic calibration methods",
    Int. J. of Robotics Research 15(6), 1996.
-.. [2] R. M. Bell, D. F. McCaffrey, "Bias reduction in standard errors for linear regression with multi-stage samples",
-   Survey Methodology 28(2), 2002.
 """
 
 from __future__ import annotations
@@ -46,7 +44,6 @@ SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
 HALVINGS = 12
 ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
-MIN_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that the ways of joints that slide have to be to set a length, root
 mean square. Taken for part of it, what is left errs by the square, 1 %."""
@@ -286,47 +283,6 @@ class Fit:
     def scatter(self) -> float:
         """Root mean square of what remains, in standard deviations, per degree of freedom."""
         return float(np.sqrt((self.rest @ self.rest) / self.freedom))
-
-
-def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
-    """Covariance of the estimates from the residuals themselves, pose by pose.
-
-    It is right also where what remains is no white noise, but what a model misses at poses that could have been
-    others. Degrees of freedom are few where few poses settle a number.
-
-    Parameters
-    ----------
-    found : a fit of k numbers and c coefficients
-    pose_of : (m,), the pose of each independent coordinate
-
-    Returns
-    -------
-    covariance : (k + c, k + c), m and rad
-    freedom : (k + c,), degrees of freedom that each variance rests on, one at least
-
-    Notes
-    -----
-    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p``. So those which the fit
-    has drawn to itself count in full. Degrees of freedom as Satterthwaite's, if noise were white [2]_.
-    """
-    C = found.covariance
-    sizes, pulls, pushes = list[Reals](), list[Reals](), list[Reals]()
-    for pose in np.unique(pose_of):
-        J, rest = found.J[pose_of == pose], found.rest[pose_of == pose]
-        size, axes = np.linalg.eigh(np.eye(len(J)) - J @ C @ J.T)
-        weight = axes / np.sqrt(np.maximum(size, MIN_OWN)) @ axes.T
-        pushes.append(J.T @ weight @ rest)
-        shares = weight @ J @ C
-        sizes.append((shares**2).sum(axis=0))
-        pulls.append(J.T @ shares)
-    own, pull = np.array(sizes), np.array(pulls)  # (P, k + c), (P, k + c, k + c)
-    drawn = np.einsum("pik,pik->pk", pull, C @ pull)
-    by_number = pull.transpose(2, 1, 0)
-    both = C @ (by_number @ by_number.transpose(0, 2, 1))
-    squares = (own**2).sum(axis=0) - 2 * (own * drawn).sum(axis=0) + np.einsum("kij,kji->k", both, both)
-    freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, MIN_OWN * (own**2).sum(axis=0))
-    errors = np.array(pushes) @ C  # squares: no rounding makes a variance negative
-    return np.asarray(errors.T @ errors, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
 def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:

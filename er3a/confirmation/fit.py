@@ -32,8 +32,6 @@ from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
 Place = Literal["base", "tool"]
-Start = tuple[Reals, Reals, Reals]
-"""Base and tool, (4, 4), and amounts of entries, from which a fit starts."""
 STEPS, HALVINGS = 16, 6
 DONE = 1e-9  # m or rad
 FLOOR = 5e-6
@@ -106,11 +104,6 @@ class State:
     amounts: Reals
 
     @property
-    def values(self) -> Start:
-        """From which to start a fit."""
-        return self.arm.base, self.arm.tool, self.amounts
-
-    @property
     def free(self) -> tuple[Entry, ...]:
         """All that is fitted: base, tool and entries."""
         return (*placements_of(self.explanation.free, self.seen.oriented), *self.entries)
@@ -175,8 +168,11 @@ class Solution(State):
 
     @property
     def errors(self) -> Reals:
-        """(p,), standard deviations of base, tool and entries, as far as free, m and rad."""
-        found: Reals = np.sqrt(np.diag(np.linalg.pinv(self.J.T @ self.J, rcond=1e-14, hermitian=True)))
+        """(p,), standard deviations of all that is free, m and rad; of the base by the axes of the controller."""
+        J, turn = self.J.copy(), self.arm.base[:3, :3].T
+        for part in (slice(3), slice(3, 6)) if "base" in self.explanation.free else ():
+            J[:, part] = J[:, part] @ turn
+        found: Reals = np.sqrt(np.diag(np.linalg.pinv(J.T @ J, rcond=1e-14, hermitian=True)))
         return found
 
     @property
@@ -232,24 +228,24 @@ class Fitter:
             orientations=pairs.turns.get(explanation.form, np.tile(np.eye(3), (count, 1, 1))),
         )
 
-    def state(self, explanation: Explanation, start: Start, entries: tuple[Entry, ...]) -> State:
+    def state(self, explanation: Explanation, near: State | Robot, entries: tuple[Entry, ...]) -> State:
         """An explanation with values to start from.
 
         Parameters
         ----------
-        start : Y, X (4, 4), and amounts of the first of the entries; 0 of others
+        near : whose base and tool are taken where they are free, and whose amounts of entries, 0 of others
         """
-        amounts = np.zeros(len(entries))
-        amounts[: len(start[2])] = start[2]
-        arm = corrected(self.robot.replace(base=start[0], tool=start[1]), entries, amounts)
-        return State(explanation, self.seen(explanation), arm, entries, amounts)
+        arm, known = (near, {}) if isinstance(near, Robot) else (near.arm, dict(zip(near.entries, near.amounts)))
+        amounts = np.array([known.get(each, 0.0) for each in entries])
+        placed = self.robot.replace(**{place: getattr(arm, place) for place in explanation.free})
+        return State(explanation, self.seen(explanation), corrected(placed, entries, amounts), entries, amounts)
 
-    def fit(self, explanation: Explanation, start: Start, weights: Reals | None = None) -> Solution:
+    def fit(self, explanation: Explanation, near: State | Robot, weights: Reals | None = None) -> Solution:
         """The values that fit best.
 
         Parameters
         ----------
-        start : Y, X (4, 4), and amounts of the explanation's first entries
+        near : where to start, as of :meth:`state`
         weights : (N,), of rows; 0 leaves one out
 
         Returns
@@ -259,7 +255,7 @@ class Fitter:
         entries = explanation.entries
         if explanation.small:
             entries = (*entries, *(each for each in self.every if each not in entries))
-        state = self.state(explanation, start, entries)
+        state = self.state(explanation, near, entries)
         weights = np.ones(len(self.pairs)) if weights is None else weights
         by_row = weights[:, None, None]
         whiten = self._whitening(state) * by_row

@@ -97,5 +97,5 @@ def _effects(robot: Robot, q: Reals) -> Reals:
     digits = np.full(robot.joints, np.radians(DIGIT_DEG)), np.full(3, DIGIT_M), float(np.radians(DIGIT_DEG))
     fitter = Fitter(robot, Pairs(q, forward(robot, q)[:, :3, 3], turns, 1, *digits))
     explanation = Explanation(plain(robot), "", 1.0, ("base", "tool"), fitter.every)
-    J, _ = fitter.linear(fitter.state(explanation, (robot.base, robot.tool, np.zeros(0)), fitter.every))
+    J, _ = fitter.linear(fitter.state(explanation, robot, fitter.every))
     return J.reshape(len(q), 6, -1) * SMALL

@@ -34,7 +34,7 @@ from itertools import product
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.by_value import ByValue, Displayed
 from er3a.errors import PoseError
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import arm_length
@@ -330,18 +330,6 @@ class Followed(ByValue, Displayed):
     slot: Integers
     start_turn: Reals
     jumps: tuple[BranchJump, ...]
-
-    def sheet(self) -> Sheet:
-        """What the notebook shows: times in s, and joints in degrees.
-
-        Returns
-        -------
-        sheet : a row for each grid point
-        """
-        rows = np.column_stack([self.t, np.degrees(self.q)])
-        found = f"Joints along a line: {len(self.t)} rows over {self.line.duration:g} s, {len(self.jumps)} jump(s)"
-        columns = ("t (s)", *(f"J{joint + 1} (deg)" for joint in range(self.q.shape[1])))
-        return Sheet.of_table(found, columns, rows, len(rows), ("a row for each time of yours: .joints(t), in rad",))
 
     def joints(self, t: Reals) -> Reals:
         """Joint angles at times, by the closed form of the branch followed there.

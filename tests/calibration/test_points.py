@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 import er3a
-from er3a.calibration.fit import Fit, covariance_by_poses
+from er3a.calibration.fit import Fit
 from er3a.calibration.observations import Measurement, PointObservations, spread
 from er3a.calibration.outcomes import CalibrationError
 from er3a.calibration.parameters import coupled, settles
@@ -27,6 +27,7 @@ from er3a.files.robot_writer import write_robot
 from er3a.finding import fact
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.kinematics.chain import row_values
+from er3a.numerics.clustered import clustered_covariance
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.calibration import (
     calibration_record,
@@ -606,7 +607,7 @@ def test_intervals_rest_on_as_many_degrees_of_freedom_as_two_means_have():
     off = rest - J @ np.linalg.lstsq(J, rest, rcond=None)[0]
     every = np.arange(first + second)
     found = Fit((), (), np.zeros(2), np.zeros(0), rest, off, J, off, np.ones(len(every)), every)
-    covariance, freedom = covariance_by_poses(found, every)
+    covariance, freedom = clustered_covariance(J, off, found.covariance, every)
     variances = rest[:first].var(ddof=1) / first, rest[first:].var(ddof=1) / second
     assert covariance[1, 1] == pytest.approx(sum(variances))
     shares = 1 / (first**2 * (first - 1)), 1 / (second**2 * (second - 1))
