@@ -193,7 +193,7 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
     final = _on_more(fitter, chosen)
     whole = Fitter(robot, pairs)
     at_all = whole.at(final)
-    before = whole.at(found.found[0])
+    (before_mm, before_deg), (left_mm, left_deg) = map(_sizes, (whole.at(found.found[0]), at_all))
     explained = final.per_freedom <= EXPLAINED
     layers = _layers(final, found.named) if explained else ()
     misread = (at_all.by_row > 9.0 * noise**2 * whole.dimensions) & explained
@@ -215,10 +215,10 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
         entries=entries,
         small=small,
         corrected=_corrected(robot, final, len(pairs)),
-        left_mm=MM * np.linalg.norm(at_all.left[:, :3], axis=1),
-        left_deg=np.degrees(np.linalg.norm(at_all.left[:, 3:], axis=1)),
-        before_mm=MM * np.linalg.norm(before.left[:, :3], axis=1),
-        before_deg=np.degrees(np.linalg.norm(before.left[:, 3:], axis=1)),
+        left_mm=left_mm,
+        left_deg=left_deg,
+        before_mm=before_mm,
+        before_deg=before_deg,
         digits_mm=MM * sd[0],
         digits_deg=float(np.degrees(sd[1])),
         fits=~misread,
@@ -231,6 +231,12 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
         notes=pairs.notes,
         oriented=bool(pairs.turns),
     )  # fmt: skip
+
+
+def _sizes(solution: Solution) -> tuple[Reals, Reals]:
+    """How far (N,) poses are off, mm and deg."""
+    away, turned = (np.linalg.norm(part, axis=1) for part in np.split(solution.left, 2, axis=1))
+    return MM * away, np.degrees(turned)
 
 
 def _chosen(found: Attempts) -> tuple[Solution, float]:
