@@ -17,7 +17,6 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue, Displayed
-from er3a.calibration import outcomes
 from er3a.calibration.cross_validation import (
     ChosenTerms,
     HeldOutErrors,
@@ -44,10 +43,12 @@ from er3a.calibration.fit import (
     without_scale,
 )
 from er3a.calibration.observations import Measurement, PointObservations, Touched, observed
-from er3a.calibration.outcomes import CalibrationError, FixedName, LevelName
 from er3a.calibration.parameters import (
     DEPENDENT,
     LEVELS,
+    CalibrationError,
+    FixedName,
+    LevelName,
     corrected,
     coupled,
     parameters_of,
@@ -309,7 +310,7 @@ class Calibration(ByValue, Displayed):
     """
 
     robot: Robot
-    level: outcomes.LevelName
+    level: LevelName
     estimates: tuple[Estimate, ...]
     held: tuple[Finding, ...]
     coordinates: int

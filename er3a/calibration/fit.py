@@ -17,9 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.calibration.observations import PointObservations
-from er3a.calibration.outcomes import CalibrationError, PlacementName
 from er3a.calibration.parameters import (
     DEPENDENT,
+    CalibrationError,
+    PlacementName,
     corrected,
     parallel_pairs,
     parameters_of,

@@ -11,8 +11,7 @@ import numpy as np
 import scipy.sparse
 from scipy.spatial import cKDTree
 
-from er3a.calibration.outcomes import FixedName, PlacementName
-from er3a.calibration.parameters import PARALLEL_RAD, placements_of
+from er3a.calibration.parameters import PARALLEL_RAD, FixedName, PlacementName, placements_of
 from er3a.comparison.entries import Entry
 from er3a.errors import InputError
 from er3a.geometry.transforms import log_rotation, nearest_rotations, transposed

@@ -8,11 +8,13 @@ where orientations were measured, by a turn about its own axes in the same order
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 
-from er3a.calibration.outcomes import LevelName, PlacementName
 from er3a.comparison.entries import BASE_COLUMNS, TOOL_COLUMNS, TOOL_TURNS, Entry, EntryUnit, entries_in, shifted
+from er3a.errors import Er3aError
+from er3a.finding import Finding
 from er3a.geometry.transforms import posed, rot_x, rot_y, rot_z, translation
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Reals
@@ -20,10 +22,27 @@ from er3a.references.quantities import MM
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
+LevelName = Literal["lengths", "lengths_and_offsets", "all_entries"]
+"""Which entries are estimated: lengths that aren't 0, joint offsets besides, or all."""
+
+PlacementName = Literal["base", "tool"]
+"""Where the arm stands, and which point of the tool was measured: estimated too, unless they are fixed."""
+
+FixedName = Literal["base", "tool", "ratios"]
+"""What can be taken as the robot's file has it: places, and by how much joints turn for what is commanded."""
+
 LEVELS: tuple[LevelName, ...] = ("lengths", "lengths_and_offsets", "all_entries")
 PARALLEL_RAD = np.radians(1.0)  # within which two axes count as parallel
 DEPENDENT = 1e-3
 """Share of a direction's length that has to lie outside the span of others to count as one more: 0.1 mm of 100 mm."""
+
+
+class CalibrationError(Er3aError):
+    """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
+
+    def __init__(self, finding: Finding, problem: str):
+        self.finding = finding
+        super().__init__(problem)
 
 
 def parameters_of(robot: Robot, level: LevelName) -> tuple[Entry, ...]:

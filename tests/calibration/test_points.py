@@ -17,8 +17,7 @@ from typer.testing import CliRunner
 import er3a
 from er3a.calibration.fit import Fit
 from er3a.calibration.observations import Measurement, PointObservations, spread
-from er3a.calibration.outcomes import CalibrationError
-from er3a.calibration.parameters import coupled, settles
+from er3a.calibration.parameters import CalibrationError, coupled, settles
 from er3a.calibration.terms import JointErrors, JointTerm, candidates, starting_table
 from er3a.errors import Er3aError, InputError
 from er3a.files.by_name import load_measurements
