@@ -694,8 +694,6 @@ def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) 
         off: Reals = part.predict(here) - part.values_mm
         return off
 
-    if not every.kinds or used.all():
-        return off_of(shifted)
     off = np.empty(len(every))
     off[used[every.pose_of]] = off_of(shifted.take(used))
     for k in np.flatnonzero(~used):

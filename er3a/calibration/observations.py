@@ -200,14 +200,7 @@ class PointObservations:
         -------
         observed : (P, 3), m; of a plane only the first column counts
         """
-        found = xyz.copy() if self.kinds else xyz
-        for kind, rows in self.groups():
-            own = xyz[rows]
-            if kind == "place":
-                found[rows] = own - own.mean(axis=0)
-            else:
-                found[rows, 0] = (own - own.mean(axis=0)) @ plane(own)[0]
-        return found
+        return self.relative_shift(np.pad(xyz, ((0, 0), (0, 3))), xyz)[:, :3] if self.kinds else xyz
 
     def gathered(self, xyz: Reals) -> Reals:
         """Points with those of one place together, at their mean, so that what turns all of them shows in none.
