@@ -691,8 +691,7 @@ def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) 
     shifted = every.shifted(errors.amounts(every.row_values, every.points(robot)))
 
     def off_of(part: PointObservations) -> Reals:
-        off: Reals = part.predict(here) - part.values_mm
-        return off
+        return part.predict(here) - part.values_mm
 
     off = np.empty(len(every))
     off[used[every.pose_of]] = off_of(shifted.take(used))

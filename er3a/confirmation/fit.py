@@ -62,8 +62,7 @@ class JointReading:
         ----------
         q : (N, n), rad or m, the pendant's
         """
-        found: Reals = q @ self.factors.T + self.shift
-        return found
+        return q @ self.factors.T + self.shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +171,7 @@ class Solution(State):
         J, turn = self.J.copy(), self.arm.base[:3, :3].T
         for part in (slice(3), slice(3, 6)) if "base" in self.explanation.free else ():
             J[:, part] = J[:, part] @ turn
-        found: Reals = np.sqrt(np.diag(np.linalg.pinv(J.T @ J, rcond=1e-14, hermitian=True)))
-        return found
+        return np.sqrt(np.diag(np.linalg.pinv(J.T @ J, rcond=1e-14, hermitian=True)))
 
     @property
     def per_freedom(self) -> float:
@@ -207,8 +205,7 @@ class Fitter:
         """
         u = row_values(self.robot, np.concatenate([each.of(self.pairs.q) for each in joints]))
         F = frames_of(tables_of(self.robot), self.robot.replace(base=np.eye(4)), u)[0, :, -1]
-        found: Reals = F.reshape(len(joints), -1, 4, 4)
-        return found
+        return F.reshape(len(joints), -1, 4, 4)
 
     def seen(self, explanation: Explanation) -> PointObservations:
         """The pairs as an explanation reads them, as observations of the tool."""

@@ -90,8 +90,7 @@ class Branches:
     @property
     def reached(self) -> Flags:
         """(N, 8) bool, whether a branch has a solution."""
-        reached: Flags = np.isfinite(self.q[..., 0])
-        return reached
+        return np.isfinite(self.q[..., 0])
 
 
 def branches_along(robot: Robot, line: ToolPath, t: Reals) -> Branches:
@@ -501,8 +500,7 @@ def _jacobian_rate(robot: Robot, J: Reals, dq: Reals) -> Reals:
     turned = np.cumsum(moving[..., 3:], axis=1)
     beyond = moving[..., :3].sum(axis=1, keepdims=True) - np.cumsum(moving[..., :3], axis=1)
     rates = np.concatenate([np.cross(turned, v) + np.cross(w, beyond), np.cross(turned, w)], axis=2)
-    found: Reals = np.swapaxes(rates, 1, 2) @ coupling
-    return found
+    return np.swapaxes(rates, 1, 2) @ coupling
 
 
 JUMP_COST = 1e7
