@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from er3a import load_measurements, load_robot
 from er3a.calibration.calibrate import Calibration, calibrate, choose_level
+from er3a.calibration.clustered import clustered_covariance
 from er3a.calibration.cross_validation import parts_of
 from er3a.calibration.fit import fit
 from er3a.calibration.observations import Measurement, PointObservations, observed
 from er3a.calibration.parameters import corrected
 from er3a.numerics.arrays import Reals
-from er3a.numerics.clustered import clustered_covariance
 from er3a.robots.robot import Robot
 from testing.plain_calibration import distances, measured_arm, plain_fit
 

@@ -17,6 +17,7 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue, Displayed
+from er3a.calibration.clustered import clustered_covariance
 from er3a.calibration.cross_validation import (
     ChosenTerms,
     HeldOutErrors,
@@ -67,7 +68,6 @@ from er3a.calibration.terms import (
 from er3a.comparison.entries import Entry
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.clustered import clustered_covariance
 from er3a.references.quantities import MM
 from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
@@ -501,12 +501,12 @@ def _covariance(observations: PointObservations, found: Fit) -> tuple[Reals, Rea
 
 
 def _estimated(
-    robot: Robot, observations: PointObservations, found: Fit, beside: Reals | None = None
+    robot: Robot, observations: PointObservations, found: Fit, others: Reals | None = None
 ) -> tuple[tuple[Estimate, ...], tuple[TermEstimate, ...]]:
-    """Entries and terms with their intervals; ``beside``: what entries that are left out do."""
+    """Entries and terms with their intervals; ``others``: what entries that are left out do."""
     covariance, quantiles = _covariance(observations, found)
-    if beside is not None:
-        bias = found.covariance @ found.J.T @ beside
+    if others is not None:
+        bias = found.covariance @ found.J.T @ others
         covariance = covariance + bias @ bias.T
     error, known = np.sqrt(np.diag(covariance)), observations.deviation_known or found.freedom > 1
     estimates = tuple(

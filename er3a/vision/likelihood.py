@@ -12,7 +12,7 @@ variances (across and along the sight, tilt, turn) at a point of the board are e
 divided by its redundancy [2]_, and the point with them.
 
 **Intervals** rest on the samples' own residuals, not on the covariance that weights them: those at one place of the
-flange are one draw, independent of other places' (:mod:`er3a.numerics.clustered`). So they hold for errors of the arm,
+flange are one draw, independent of other places' (:mod:`er3a.calibration.clustered`). So they hold for errors of the arm,
 too, and for noise that is otherwise than stated.
 
 References
@@ -31,9 +31,9 @@ from functools import cached_property, partial
 import numpy as np
 import scipy
 
+from er3a.calibration.clustered import clustered_covariance
 from er3a.geometry.transforms import frame_along, inverse_right_jacobian, log_rotation, moved, skew, transposed
 from er3a.numerics.arrays import Reals
-from er3a.numerics.clustered import clustered_covariance
 from er3a.vision.calibration_set import CalibrationSet
 
 UNKNOWNS = 12  # position and rotation of both poses

@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 import er3a
+from er3a.calibration.clustered import clustered_covariance
 from er3a.calibration.fit import Fit
 from er3a.calibration.observations import Measurement, PointObservations, spread
 from er3a.calibration.parameters import CalibrationError, coupled, settles
@@ -26,7 +27,6 @@ from er3a.files.robot_writer import write_robot
 from er3a.finding import fact
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.kinematics.chain import row_values
-from er3a.numerics.clustered import clustered_covariance
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.calibration import (
     calibration_record,
