@@ -171,7 +171,8 @@ class Sheet:
         facts: tuple[str, ...] = (),
     ) -> Sheet:
         """With the first of ``count`` rows of values."""
-        return cls(heading, columns, *first_rows(rows, count), facts)
+        shown = tuple(tuple(shortly(value) for value in row) for row in islice(rows, MAX_ROWS))
+        return cls(heading, columns, shown, max(count - len(shown), 0), facts)
 
 
 class Displayed:
@@ -187,12 +188,6 @@ class Displayed:
 
     def _repr_html_(self) -> str:
         return as_html(self.sheet())
-
-
-def first_rows(rows: Iterable[Sequence[Any]], count: int) -> tuple[tuple[tuple[str, ...], ...], int]:
-    """The first rows of a table of so many as texts, and the number of those left out."""
-    shown = tuple(tuple(shortly(value) for value in row) for row in islice(rows, MAX_ROWS))
-    return shown, max(count - len(shown), 0)
 
 
 def shortly(value: Any) -> str:

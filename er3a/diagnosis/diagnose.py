@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.diagnosis.defined_otherwise import conventions_of, counted_from_ground
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.diagnosis.fitting import MEETS
@@ -100,14 +100,13 @@ class Diagnosis(list[Hypothesis], Displayed):
             (place + 1, each.faults, each.residual_before, each.residual_after, each.unit, each.explains)
             for place, each in enumerate(self)
         )
-        shown, left_out = first_rows(rows, len(self))
         heading = f"Diagnosis by {self.references} references, {self.tried} hypotheses tried"
         facts = {"reach that is missed": len(self.missed) or "", "not examined": ", ".join(self.not_examined)}
-        return Sheet(
+        return Sheet.of_table(
             f"{heading}: {shortly(self.conclusion)}",
             ("place", "faults", "before", "after", "unit", "explains all"),
-            shown,
-            left_out,
+            rows,
+            len(self),
             tuple(f"{name}: {value}" for name, value in facts.items() if value),
         )
 

@@ -12,8 +12,8 @@ variances (across and along the sight, tilt, turn) at a point of the board are e
 divided by its redundancy [2]_, and the point with them.
 
 **Intervals** rest on the samples' own residuals, not on the covariance that weights them: those at one place of the
-flange are one draw, independent of other places' (:mod:`er3a.calibration.clustered`). So they hold for errors of the arm,
-too, and for noise that is otherwise than stated.
+flange are one draw, independent of other places' (:mod:`er3a.calibration.clustered`). So they hold for errors of the
+arm, too, and for noise that is otherwise than stated.
 
 References
 ----------
