@@ -17,7 +17,6 @@ short, whatever the size of the object.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
@@ -172,27 +171,23 @@ class Sheet:
         facts: tuple[str, ...] = (),
     ) -> Sheet:
         """With the first of ``count`` rows of values."""
-        return cls(heading, columns, *first_rows(rows, count), facts)
+        shown = tuple(tuple(shortly(value) for value in row) for row in islice(rows, MAX_ROWS))
+        return cls(heading, columns, shown, max(count - len(shown), 0), facts)
 
 
-class Displayed(ABC):
+class Displayed:
     """Anything that shows itself as a sheet, to ``repr`` and ``print`` as well as to a notebook."""
 
-    @abstractmethod
     def sheet(self) -> Sheet:
-        """What is shown."""
+        """What is shown: of a dataclass the name and value of each attribute, if nothing else is said of it."""
+        rows = [(part.name, getattr(self, part.name)) for part in fields(self) if part.repr]  # type: ignore[arg-type]
+        return Sheet.of_table(type(self).__name__, ("attribute", "value"), rows, len(rows))
 
     def __repr__(self) -> str:
         return as_text(self.sheet())
 
     def _repr_html_(self) -> str:
         return as_html(self.sheet())
-
-
-def first_rows(rows: Iterable[Sequence[Any]], count: int) -> tuple[tuple[tuple[str, ...], ...], int]:
-    """The first rows of a table of so many as texts, and the number of those left out."""
-    shown = tuple(tuple(shortly(value) for value in row) for row in islice(rows, MAX_ROWS))
-    return shown, max(count - len(shown), 0)
 
 
 def shortly(value: Any) -> str:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from er3a import load_measurements, load_robot
 from er3a.calibration.calibrate import Calibration, calibrate, choose_level
+from er3a.calibration.clustered import clustered_covariance
 from er3a.calibration.cross_validation import parts_of
-from er3a.calibration.fit import covariance_by_poses, fit
+from er3a.calibration.fit import fit
 from er3a.calibration.observations import Measurement, PointObservations, observed
 from er3a.calibration.parameters import corrected
 from er3a.numerics.arrays import Reals
@@ -101,7 +102,8 @@ def halves(name: str, splits: int, seed: int) -> tuple[tuple[str, ...], NDArray[
         for half in (seen.take(first), seen.take(~first)):
             found = fit(whole, kept, half)
             values.append(found.amounts)
-            covariance, freedom = covariance_by_poses(found, half.pose_of[found.last])
+            pose_of = half.pose_of[found.last]
+            covariance, freedom = clustered_covariance(found.J, found.rest, found.covariance, pose_of)
             squares.append(scipy.special.stdtrit(freedom, 0.975) ** 2 * np.diag(covariance))
         inside[split] = np.abs(values[0] - values[1]) <= np.sqrt(squares[0] + squares[1])
     return tuple(parameter.name for parameter in kept), inside

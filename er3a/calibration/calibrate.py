@@ -16,8 +16,8 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
-from er3a.calibration import outcomes
+from er3a.by_value import ByValue, Displayed
+from er3a.calibration.clustered import clustered_covariance
 from er3a.calibration.cross_validation import (
     ChosenTerms,
     HeldOutErrors,
@@ -34,7 +34,6 @@ from er3a.calibration.fit import (
     ROUNDING,
     Fit,
     Subspace,
-    covariance_by_poses,
     fit,
     held_with,
     jacobian,
@@ -45,10 +44,12 @@ from er3a.calibration.fit import (
     without_scale,
 )
 from er3a.calibration.observations import Measurement, PointObservations, Touched, observed
-from er3a.calibration.outcomes import CalibrationError, FixedName, LevelName
 from er3a.calibration.parameters import (
     DEPENDENT,
     LEVELS,
+    CalibrationError,
+    FixedName,
+    LevelName,
     corrected,
     coupled,
     parameters_of,
@@ -309,7 +310,7 @@ class Calibration(ByValue, Displayed):
     """
 
     robot: Robot
-    level: outcomes.LevelName
+    level: LevelName
     estimates: tuple[Estimate, ...]
     held: tuple[Finding, ...]
     coordinates: int
@@ -404,24 +405,6 @@ class Calibration(ByValue, Displayed):
         """
         return self.model.distances_mm(measurements)
 
-    def sheet(self) -> Sheet:
-        """What the notebook shows: a row for each estimated entry, in mm and deg, with its 95 % interval.
-
-        Returns
-        -------
-        sheet : with the conclusion, and why other entries were held
-        """
-        rows = ((each.name, each.nominal, each.correction, each.half_width, each.unit) for each in self.estimates)
-        shown, left = first_rows(rows, len(self.estimates))
-        rms = f"rms {shortly(self.rms_before_mm)} -> {shortly(self.rms_after_mm)} mm"
-        return Sheet(
-            f"Calibration of {self.robot.name} with {self.coordinates} coordinates at {self.poses} poses: {rms}",
-            ("entry", "nominal", "correction", "+-95 %", "unit"),
-            shown,
-            left,
-            (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
-        )
-
 
 def calibrate(
     robot: Robot,
@@ -455,15 +438,14 @@ def calibrate(
 
 def _result(robot: Robot, level: Level, observations: PointObservations, found: Fit) -> Calibration:
     """What the table, with ratios, has of a calibration."""
-    beside = _beside(robot, level, observations, found)
-    covariance, quantiles = _covariance(observations, found, beside)
-    error, deviation = np.sqrt(np.diag(covariance)), observations.deviation_mm
+    beside, deviation = _beside(robot, level, observations, found), observations.deviation_mm
+    estimates, ratios = _estimated(robot, observations, found, beside)
     here = corrected(robot, found.kept, found.amounts)
     return Calibration(
         robot=coupled(here, {(t.joint, t.by or t.joint): float(c) for t, c in zip(found.terms, found.coefficients)}),
         level=level.name,
-        estimates=_estimates(robot, observations, found, error, quantiles),
-        ratios=_term_estimates(found, error),
+        estimates=estimates,
+        ratios=ratios,
         held=level.held,
         coordinates=len(observations),
         poses=observations.poses,
@@ -505,29 +487,29 @@ def _scatter(found: Fit, beside: Reals) -> float:
     return float(np.sqrt((left @ left) / found.freedom))
 
 
-def _covariance(observations: PointObservations, found: Fit, beside: Reals) -> tuple[Reals, Reals]:
+def _covariance(observations: PointObservations, found: Fit) -> tuple[Reals, Reals]:
     """By the stated deviations; where none was stated, by what remains at each pose, or of all poses alike if these are
-    few; and half-widths (k + c,) of 95 % intervals in standard errors. ``beside``: of entries that are left out."""
-    covariance, quantiles = _covariance_by_noise(observations, found)
-    bias = found.covariance @ found.J.T @ beside
-    return covariance + bias @ bias.T, quantiles
-
-
-def _covariance_by_noise(observations: PointObservations, found: Fit) -> tuple[Reals, Reals]:
+    few; and half-widths (k + c,) of 95 % intervals in standard errors."""
     if observations.deviation_known:
         return found.covariance, np.full(found.J.shape[1], INTERVAL_95)
     if found.freedom < max(FEW_SPARE, found.J.shape[1]):
         quantile = float(scipy.special.stdtrit(found.freedom, 0.975))
         return found.scatter**2 * found.covariance, np.full(found.J.shape[1], quantile)
-    covariance, freedom = covariance_by_poses(found, observations.same_pose[observations.pose_of[found.last]])
+    pose_of = observations.same_pose[observations.pose_of[found.last]]
+    covariance, freedom = clustered_covariance(found.J, found.rest, found.covariance, pose_of)
     return covariance, np.asarray(scipy.special.stdtrit(freedom, 0.975))
 
 
-def _estimates(
-    robot: Robot, observations: PointObservations, found: Fit, error: Reals, quantiles: Reals
-) -> tuple[Estimate, ...]:
-    known = observations.deviation_known or found.freedom > 1
-    return tuple(
+def _estimated(
+    robot: Robot, observations: PointObservations, found: Fit, others: Reals | None = None
+) -> tuple[tuple[Estimate, ...], tuple[TermEstimate, ...]]:
+    """Entries and terms with their intervals; ``others``: what entries that are left out do."""
+    covariance, quantiles = _covariance(observations, found)
+    if others is not None:
+        bias = found.covariance @ found.J.T @ others
+        covariance = covariance + bias @ bias.T
+    error, known = np.sqrt(np.diag(covariance)), observations.deviation_known or found.freedom > 1
+    estimates = tuple(
         Estimate(
             parameter,
             parameter.value(robot),
@@ -538,6 +520,16 @@ def _estimates(
         )
         for parameter, amount, own, quantile in zip(found.kept, found.amounts, error, quantiles)
     )
+    of_terms = error[len(found.kept) :]
+    terms = tuple(
+        TermEstimate(
+            **vars(term),
+            coefficients=tuple((1000 * found.coefficients[own]).tolist()),
+            standard_errors=tuple((1000 * of_terms[own]).tolist()),
+        )
+        for term, own in zip(found.terms, places_of(found.terms))
+    )
+    return estimates, terms
 
 
 def _fitted(robot: Robot, level: Level, observations: PointObservations) -> Fit:
@@ -569,7 +561,10 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
     level = choose_level(robot, observations)
     observations, table = _refitted(robot, observations, _fitted(robot, level, observations))
     here = corrected(robot, table.kept, table.amounts)
-    unclear = level.left or (observations.all_touched and not _settled(robot, observations, table))
+    # A table is so far from straight in what touches leave open that terms would be taken for that.
+    unclear = level.left or (
+        observations.all_touched and not all(each.settled for each in _estimated(robot, observations, table)[0])
+    )
     ways = () if unclear else FOR_ALL_JOINTS  # terms would stand for what entries that are left out do
     choice, for_file = choose_terms(robot, here, table.kept, observations, ways), ChosenTerms((), ())
     all_tried = any(each.kind == "coupling" for each in choice.tried)
@@ -600,14 +595,6 @@ def _refitted(robot: Robot, observations: PointObservations, found: Fit) -> tupl
         deviation[own] *= np.sqrt(left @ left / share) if len(left) else 1.0
     seen = observations.with_deviation(deviation)
     return seen, fit(robot, found.kept, seen, found.terms)
-
-
-def _settled(robot: Robot, observations: PointObservations, table: Fit) -> bool:
-    """Whether all entries are settled: else a table is so far from straight in what touches leave open that terms would
-    be taken for that."""
-    covariance, quantiles = _covariance_by_noise(observations, table)
-    error = np.sqrt(np.diag(covariance))
-    return all(each.settled for each in _estimates(robot, observations, table, error, quantiles))
 
 
 def _error_left_out(observations: PointObservations, found: Fit) -> float:
@@ -704,11 +691,8 @@ def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) 
     shifted = every.shifted(errors.amounts(every.row_values, every.points(robot)))
 
     def off_of(part: PointObservations) -> Reals:
-        off: Reals = part.predict(here) - part.values_mm
-        return off
+        return part.predict(here) - part.values_mm
 
-    if not every.kinds or used.all():
-        return off_of(shifted)
     off = np.empty(len(every))
     off[used[every.pose_of]] = off_of(shifted.take(used))
     for k in np.flatnonzero(~used):
@@ -726,26 +710,13 @@ def _left_out(observations: PointObservations, found: Fit) -> HeldOutErrors | No
     return left_out(observations, found) if can_leave_out(observations.pose_of[found.last], found.J.shape[1]) else None
 
 
-def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
-    own_error = error[len(found.kept) :]
-    return tuple(
-        TermEstimate(
-            **vars(term),
-            coefficients=tuple((1000 * found.coefficients[own]).tolist()),
-            standard_errors=tuple((1000 * own_error[own]).tolist()),
-        )
-        for term, own in zip(found.terms, places_of(found.terms))
-    )
-
-
 def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond:
-    covariance, quantiles = _covariance_by_noise(observations, found)
-    error = np.sqrt(np.diag(covariance))
+    estimates, terms = _estimated(robot, observations, found)
     return Beyond(
         robot=corrected(robot, found.kept, found.amounts),
         errors=JointErrors(robot, found.terms, found.coefficients),
-        terms=_term_estimates(found, error),
-        estimates=_estimates(robot, observations, found, error, quantiles),
+        terms=terms,
+        estimates=estimates,
         rms_mm=observations.rms_mm(found.after * observations.deviation_mm),
         deviation_mm=_deviation(observations, found),
         left_out=_left_out(observations, found),

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import scipy
@@ -22,7 +23,6 @@ from scipy.cluster.vq import kmeans, vq
 
 from er3a.calibration.fit import ROUNDING, Fit, jacobian
 from er3a.calibration.observations import PointObservations
-from er3a.calibration.outcomes import TermVerdict
 from er3a.calibration.parameters import DEPENDENT
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
@@ -40,6 +40,9 @@ from er3a.comparison.entries import Entry
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
+TermVerdict = Literal["taken", "not_lower", "noise", "wrong_way"]
+"""Whether a term beyond the table was taken; or left, because poses left out are not met better with it, because noise
+may have made it, or because a load would have to lift the arm."""
 PARTS = 10  # tenths, each left out once
 SEEDS = 1, 2, 3, 4  # of ways of leaving out; an average of several depends less on the draw
 SURE = 1e-5

@@ -6,8 +6,6 @@ References
 ----------
 .. [1] J. M. Hollerbach, C. W. Wampler, "The calibration index and taxonomy for robot kinematic calibration methods",
    Int. J. of Robotics Research 15(6), 1996.
-.. [2] R. M. Bell, D. F. McCaffrey, "Bias reduction in standard errors for linear regression with multi-stage samples",
-   Survey Methodology 28(2), 2002.
 """
 
 from __future__ import annotations
@@ -19,9 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.calibration.observations import PointObservations
-from er3a.calibration.outcomes import CalibrationError, PlacementName
 from er3a.calibration.parameters import (
     DEPENDENT,
+    CalibrationError,
+    PlacementName,
     corrected,
     parallel_pairs,
     parameters_of,
@@ -31,7 +30,7 @@ from er3a.calibration.parameters import (
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
 from er3a.comparison.entries import BASE_COLUMNS, Entry, entry_twists
 from er3a.finding import Finding, fact
-from er3a.geometry.transforms import nearest_rotations, posed, rpy_of, transposed
+from er3a.geometry.transforms import nearest_rotations, posed, rpy_of, skew, transposed
 from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
@@ -46,7 +45,6 @@ SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
 HALVINGS = 12
 ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
-MIN_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that the ways of joints that slide have to be to set a length, root
 mean square. Taken for part of it, what is left errs by the square, 1 %."""
@@ -95,20 +93,22 @@ def jacobian(
     J : (n, p), mm per m or rad, and mrad of orientations; small turns count, however far these are from measured ones
     """
     amounts = np.broadcast_to(amounts, len(parameters))
-    here, of_rows = corrected(robot, parameters, amounts), np.array([bool(each.joint) for each in parameters])
+    here = corrected(robot, parameters, amounts) if amounts.any() else robot
+    of_rows = np.array([bool(each.joint) for each in parameters], dtype=bool)
     xyz, turns = observations.positions(here), observations.turns(here)
     xyz = observations.gathered(xyz) if gathered else xyz
     rows = [each for each in parameters if each.joint]
     shifts = np.empty((len(xyz), 6, len(parameters)))
     shifts[..., of_rows] = entry_twists(tables_of(here), here, observations.row_values, rows, xyz)
     by_tool = np.where(observations.on_tool[:, None, None], turns, 0.0)
-    for k in np.flatnonzero(~of_rows).tolist():
-        along, about = placing_axes(parameters[k], parameters, amounts)
-        if parameters[k].column in BASE_COLUMNS:
-            along, about = robot.base[:3, :3] @ along, robot.base[:3, :3] @ about
-            shifts[:, :3, k], shifts[:, 3:, k] = along + np.cross(about, xyz - here.base[:3, 3]), about
-        else:
-            shifts[:, :3, k], shifts[:, 3:, k] = by_tool @ along, by_tool @ robot.tool[:3, :3] @ about
+    if not of_rows.all():
+        along, about = placing_axes(parameters, amounts)
+        of_base = np.array([each.column in BASE_COLUMNS for each in parameters])
+        of_tool, lever = ~of_rows & ~of_base, skew(xyz - here.base[:3, 3])
+        by_base, turned = (robot.base[:3, :3] @ each[of_base].T for each in (along, about))
+        shifts[:, :3, of_base], shifts[:, 3:, of_base] = by_base - lever @ turned, turned
+        shifts[:, :3, of_tool] = by_tool @ along[of_tool].T
+        shifts[:, 3:, of_tool] = by_tool @ robot.tool[:3, :3] @ about[of_tool].T
     return MM * observations.relative_shift(shifts, xyz)[observations.seen]
 
 
@@ -284,47 +284,6 @@ class Fit:
     def scatter(self) -> float:
         """Root mean square of what remains, in standard deviations, per degree of freedom."""
         return float(np.sqrt((self.rest @ self.rest) / self.freedom))
-
-
-def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
-    """Covariance of the estimates from the residuals themselves, pose by pose.
-
-    It is right also where what remains is no white noise, but what a model misses at poses that could have been
-    others. Degrees of freedom are few where few poses settle a number.
-
-    Parameters
-    ----------
-    found : a fit of k numbers and c coefficients
-    pose_of : (m,), the pose of each independent coordinate
-
-    Returns
-    -------
-    covariance : (k + c, k + c), m and rad
-    freedom : (k + c,), degrees of freedom that each variance rests on, one at least
-
-    Notes
-    -----
-    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p``. So those which the fit
-    has drawn to itself count in full. Degrees of freedom as Satterthwaite's, if noise were white [2]_.
-    """
-    C = found.covariance
-    sizes, pulls, pushes = list[Reals](), list[Reals](), list[Reals]()
-    for pose in np.unique(pose_of):
-        J, rest = found.J[pose_of == pose], found.rest[pose_of == pose]
-        size, axes = np.linalg.eigh(np.eye(len(J)) - J @ C @ J.T)
-        weight = axes / np.sqrt(np.maximum(size, MIN_OWN)) @ axes.T
-        pushes.append(J.T @ weight @ rest)
-        shares = weight @ J @ C
-        sizes.append((shares**2).sum(axis=0))
-        pulls.append(J.T @ shares)
-    own, pull = np.array(sizes), np.array(pulls)  # (P, k + c), (P, k + c, k + c)
-    drawn = np.einsum("pik,pik->pk", pull, C @ pull)
-    by_number = pull.transpose(2, 1, 0)
-    both = C @ (by_number @ by_number.transpose(0, 2, 1))
-    squares = (own**2).sum(axis=0) - 2 * (own * drawn).sum(axis=0) + np.einsum("kij,kji->k", both, both)
-    freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, MIN_OWN * (own**2).sum(axis=0))
-    errors = np.array(pushes) @ C  # squares: no rounding makes a variance negative
-    return np.asarray(errors.T @ errors, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
 def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:

@@ -11,8 +11,7 @@ import numpy as np
 import scipy.sparse
 from scipy.spatial import cKDTree
 
-from er3a.calibration.outcomes import FixedName, PlacementName
-from er3a.calibration.parameters import PARALLEL_RAD, placements_of
+from er3a.calibration.parameters import PARALLEL_RAD, FixedName, PlacementName, placements_of
 from er3a.comparison.entries import Entry
 from er3a.errors import InputError
 from er3a.geometry.transforms import log_rotation, nearest_rotations, transposed
@@ -201,14 +200,7 @@ class PointObservations:
         -------
         observed : (P, 3), m; of a plane only the first column counts
         """
-        found = xyz.copy() if self.kinds else xyz
-        for kind, rows in self.groups():
-            own = xyz[rows]
-            if kind == "place":
-                found[rows] = own - own.mean(axis=0)
-            else:
-                found[rows, 0] = (own - own.mean(axis=0)) @ plane(own)[0]
-        return found
+        return self.relative_shift(np.pad(xyz, ((0, 0), (0, 3))), xyz)[:, :3] if self.kinds else xyz
 
     def gathered(self, xyz: Reals) -> Reals:
         """Points with those of one place together, at their mean, so that what turns all of them shows in none.
@@ -310,8 +302,7 @@ class PointObservations:
         """
         tool = np.where(self.on_tool[:, None, None], robot.tool[:3, :3], np.eye(3))
         turned = log_rotation(self.turns(robot) @ tool @ transposed(self.orientations))
-        values: Reals = MM * np.hstack([self.relative(self.positions(robot)), turned])[self.seen]
-        return values
+        return MM * np.hstack([self.relative(self.positions(robot)), turned])[self.seen]
 
     def positions(self, robot: Robot) -> Reals:
         """Measured points by a robot's table.
@@ -370,8 +361,7 @@ class PointObservations:
         ways = np.where(robot.sliding, robot.direction * self.row_values, 0.0)
         shift = np.einsum("pmi,pm->pi", T[:, :-1, :3, 2], ways)
         shift = np.pad(shift, ((0, 0), (0, 3)))  # what slides turns nothing
-        found: Reals = MM * self.relative_shift(shift, self.positions(robot))[self.seen]
-        return found
+        return MM * self.relative_shift(shift, self.positions(robot))[self.seen]
 
     def take(self, used: Flags) -> PointObservations:
         """Observations of some points.
@@ -512,8 +502,7 @@ def _innovations(basis: Reals) -> Reals:
     """Orthonormal rows (k - r, k) beside a basis (k, r), each with no part in one more of the last places than the row
     before it."""
     outside = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :].T
-    found: Reals = np.asarray(np.linalg.qr(outside[:, ::-1], mode="r"))[:, ::-1]
-    return found
+    return np.asarray(np.linalg.qr(outside[:, ::-1], mode="r"))[:, ::-1]
 
 
 def plane(xyz: Reals) -> tuple[Reals, Reals]:

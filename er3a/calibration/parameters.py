@@ -8,11 +8,13 @@ where orientations were measured, by a turn about its own axes in the same order
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 
-from er3a.calibration.outcomes import LevelName, PlacementName
 from er3a.comparison.entries import BASE_COLUMNS, TOOL_COLUMNS, TOOL_TURNS, Entry, EntryUnit, entries_in, shifted
+from er3a.errors import Er3aError
+from er3a.finding import Finding
 from er3a.geometry.transforms import posed, rot_x, rot_y, rot_z, translation
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Reals
@@ -20,10 +22,27 @@ from er3a.references.quantities import MM
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
+LevelName = Literal["lengths", "lengths_and_offsets", "all_entries"]
+"""Which entries are estimated: lengths that aren't 0, joint offsets besides, or all."""
+
+PlacementName = Literal["base", "tool"]
+"""Where the arm stands, and which point of the tool was measured: estimated too, unless they are fixed."""
+
+FixedName = Literal["base", "tool", "ratios"]
+"""What can be taken as the robot's file has it: places, and by how much joints turn for what is commanded."""
+
 LEVELS: tuple[LevelName, ...] = ("lengths", "lengths_and_offsets", "all_entries")
 PARALLEL_RAD = np.radians(1.0)  # within which two axes count as parallel
 DEPENDENT = 1e-3
 """Share of a direction's length that has to lie outside the span of others to count as one more: 0.1 mm of 100 mm."""
+
+
+class CalibrationError(Er3aError):
+    """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
+
+    def __init__(self, finding: Finding, problem: str):
+        self.finding = finding
+        super().__init__(problem)
 
 
 def parameters_of(robot: Robot, level: LevelName) -> tuple[Entry, ...]:
@@ -124,26 +143,28 @@ def placed(parameters: Sequence[Entry], amounts: Reals) -> tuple[Reals, Reals]:
     return at(BASE_COLUMNS), at((*TOOL_COLUMNS, *TOOL_TURNS))
 
 
-def placing_axes(parameter: Entry, parameters: Sequence[Entry], amounts: Reals) -> tuple[Reals, Reals]:
-    """Along and about which axis a parameter of base or tool moves what it places.
+def placing_axes(parameters: Sequence[Entry], amounts: Reals) -> tuple[Reals, Reals]:
+    """Along and about which axes parameters of base and tool move what they place.
 
     Parameters
     ----------
-    parameter : of base or tool
     parameters, amounts : p entries and (p,), m or rad, at which it is asked
 
     Returns
     -------
-    along, about : (3,), of which one is 0; in the axes that base or tool have without corrections
+    along, about : (p, 3), of which one is 0, both for entries of the table; in the axes that base or tool have without
+        corrections
     """
+    found: Reals = np.zeros((2, len(parameters), 3))
     S, X = placed(parameters, amounts)
-    place, _, part = parameter.column.partition("_")
-    yaw = dict(zip((each.column for each in parameters), amounts)).get(f"{place}_rz", 0.0)
-    axes: Reals = np.eye(3)
-    if len(part) == 1:
-        return axes["xyz".index(part)], np.zeros(3)
-    axes[0], axes[1] = (S if place == "base" else X)[:3, 0], rot_z(yaw)[:3, 1]
-    return np.zeros(3), axes["xyz".index(part[1])]
+    yaws = {each.column: amount for each, amount in zip(parameters, amounts)}
+    for k, parameter in enumerate(parameters):
+        place, _, part = parameter.column.partition("_")
+        if part:
+            yaw = rot_z(yaws.get(f"{place}_rz", 0.0))[:3, 1]
+            turns = {"rx": (S if place == "base" else X)[:3, 0], "ry": yaw, "rz": np.eye(3)[2]}
+            found[int(part in turns), k] = turns[part] if part in turns else np.eye(3)["xyz".index(part)]
+    return found[0], found[1]
 
 
 WIDEST = 0.05
@@ -210,6 +231,8 @@ def corrected(robot: Robot, parameters: Sequence[Entry], amounts: Reals) -> Robo
     robot : its base is ``base S``, its tool's point is shifted in the flange's frame, and the tool turned about it
     """
     found = robot_of(shifted(tables_of(robot), parameters, amounts[None]), 0, robot)
+    if all(parameter.joint for parameter in parameters):
+        return found
     S, X = placed(parameters, amounts)
     if any(parameter.column in BASE_COLUMNS for parameter in parameters):
         found = found.replace(base=robot.base @ S)

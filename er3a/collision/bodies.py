@@ -113,8 +113,7 @@ class Bodies:
         points : (..., bodies, k, 3), m, world frame
         """
         T = link_frames(self.robot, q)[..., [body.link for body in self.capsules], :, :]
-        placed: Reals = self._padded @ T[..., :3, :3].swapaxes(-1, -2) + T[..., None, :3, 3]
-        return placed
+        return self._padded @ T[..., :3, :3].swapaxes(-1, -2) + T[..., None, :3, 3]
 
     def distances(self, q: Reals, pairs: Integers) -> Reals:
         """Distances of some pairs in one arm pose.
@@ -253,8 +252,7 @@ class Bodies:
         length = float(np.linalg.norm(along))
         unit = along / length if length > 0 else np.zeros(3)
         sizes = [self.all[b].radius for b in (self.layout.first[pair], self.layout.second[pair])]
-        points: Reals = np.array([near[0] + sizes[0] * unit, near[1] - sizes[1] * unit])
-        return points
+        return np.array([near[0] + sizes[0] * unit, near[1] - sizes[1] * unit])
 
     def always_overlaps(self, pair: int) -> bool:
         """Whether a pair overlaps in all arm poses within the limits, proven on boxes of joint vectors.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Integers, Reals
@@ -154,8 +154,8 @@ class Scene(ByValue, Displayed):
         sheet : its first rows, and how many are left out
         """
         rows = ((solid.name, type(solid).__name__.lower(), solid.measures) for solid in self.solids)
-        shown, left_out = first_rows(rows, len(self.solids))
-        return Sheet(f"Scene: {shortly(self.title)}", ("name", "solid", "measures"), shown, left_out)
+        columns = ("name", "solid", "measures")
+        return Sheet.of_table(f"Scene: {shortly(self.title)}", columns, rows, len(self.solids))
 
 
 def _check(name: str, T: Reals, *sizes: float) -> None:

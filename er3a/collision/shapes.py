@@ -230,8 +230,7 @@ def _beyond(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: s
     T = link_frames(robot, np.clip(np.zeros(robot.joints), robot.lower, robot.upper))
 
     def placed(points: Reals, k: int) -> Reals:
-        found: Reals = points @ T[k, :3, :3].T + T[k, :3, 3]
-        return found
+        return points @ T[k, :3, :3].T + T[k, :3, 3]
 
     points = placed(points, link)
     outside = np.full(len(points), np.inf)
@@ -543,8 +542,7 @@ def placed_points(solid: Mesh) -> Reals:
     ----------
     solid : of a scene
     """
-    placed: Reals = solid.points @ solid.T[:3, :3].T + solid.T[:3, 3]
-    return placed
+    return solid.points @ solid.T[:3, :3].T + solid.T[:3, 3]
 
 
 def layout_of(

@@ -123,8 +123,7 @@ def _nearly_parallel(z: Reals, other: Reals) -> bool:
 
 def _foot(point: Reals, axis: Reals, on_axis: Reals) -> Reals:
     """Point of the line nearest to ``point``."""
-    foot: Reals = on_axis + axis * (axis @ (point - on_axis))
-    return foot
+    return on_axis + axis * (axis @ (point - on_axis))
 
 
 def _senses(directions: Reals, incoming: Reals, outgoing: Reals) -> Reals:

@@ -513,8 +513,7 @@ def _alignment(found: mechanism.Match) -> Alignment:
 def _aligned_flanges(a: Robot, b: Robot, by: Alignment, u: Reals) -> Reals:
     """B's flanges (k, 4, 4) brought to A's, at values (k, m) of A's rows."""
     moved = forward_of_rows(b, by.signs * (u - by.zeros * a.direction))
-    flanges: Reals = by.base @ moved @ np.linalg.inv(by.flange)
-    return flanges
+    return by.base @ moved @ np.linalg.inv(by.flange)
 
 
 def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> Alignment:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet
-from er3a.calibration.parameters import corrected
+from er3a.by_value import ByValue, Displayed
 from er3a.comparison.entries import Entry
-from er3a.confirmation.fit import Fitter, Solution
+from er3a.confirmation.fit import Fitter, Place, Solution
 from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, parts_of, search
 from er3a.confirmation.pairs import Pairs, spread
 from er3a.confirmation.poses import read_pairs
@@ -137,17 +136,6 @@ class Confirmation(ByValue, Displayed):
     notes: tuple[tuple[str, str], ...]
     oriented: bool
 
-    def sheet(self) -> Sheet:
-        """Verdict and what is left at each pose, for printing.
-
-        Returns
-        -------
-        sheet : one row for each pose
-        """
-        columns = ("line", "mm before", "mm", "deg")
-        rows = zip(self.lines.tolist(), self.before_mm, self.left_mm, self.left_deg)
-        return Sheet.of_table(f"Confirmation: {self.verdict}", columns, rows, len(self.lines), self.layers)
-
     def __bool__(self) -> bool:
         raise TypeError("a confirmation is neither true nor false; read its verdict")
 
@@ -205,14 +193,15 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
     final = _on_more(fitter, chosen)
     whole = Fitter(robot, pairs)
     at_all = whole.at(final)
-    before = whole.at(found.found[0])
+    (before_mm, before_deg), (left_mm, left_deg) = map(_sizes, (whole.at(found.found[0]), at_all))
     explained = final.per_freedom <= EXPLAINED
     layers = _layers(final, found.named) if explained else ()
     misread = (at_all.by_row > 9.0 * noise**2 * whole.dimensions) & explained
     if misread.any() and "reading" not in layers:
         layers = ("reading", *layers)
-    sd = whole.expected(final)
-    places, (entries, small) = _places(final), _entries(robot, final)
+    sd = whole.expected(at_all)
+    half = dict(zip(final.free, (INTERVAL_95 * final.errors).tolist()))
+    entries, small = _entries(robot, final, half)
     unseen, taken_up = _unseen(fitter, final) if explained else ((), ())
     return Confirmation(
         verdict=(layers[-1] if layers else "agrees") if explained else "open",
@@ -221,15 +210,15 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
         renamed=final.explanation.form not in found.named,
         factor=final.explanation.factor,
         joints=final.explanation.joints.faults,
-        base=places["base"],
-        tool=places["tool"],
+        base=_placed(final, "base", half),
+        tool=_placed(final, "tool", half),
         entries=entries,
         small=small,
         corrected=_corrected(robot, final, len(pairs)),
-        left_mm=MM * np.linalg.norm(at_all.off[:, :3], axis=1),
-        left_deg=np.degrees(np.linalg.norm(at_all.off[:, 3:], axis=1)),
-        before_mm=MM * np.linalg.norm(before.off[:, :3], axis=1),
-        before_deg=np.degrees(np.linalg.norm(before.off[:, 3:], axis=1)),
+        left_mm=left_mm,
+        left_deg=left_deg,
+        before_mm=before_mm,
+        before_deg=before_deg,
         digits_mm=MM * sd[0],
         digits_deg=float(np.degrees(sd[1])),
         fits=~misread,
@@ -242,6 +231,12 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
         notes=pairs.notes,
         oriented=bool(pairs.turns),
     )  # fmt: skip
+
+
+def _sizes(solution: Solution) -> tuple[Reals, Reals]:
+    """How far (N,) poses are off, mm and deg."""
+    away, turned = (np.linalg.norm(part, axis=1) for part in np.split(solution.left, 2, axis=1))
+    return MM * away, np.degrees(turned)
 
 
 def _chosen(found: Attempts) -> tuple[Solution, float]:
@@ -258,10 +253,10 @@ def _chosen(found: Attempts) -> tuple[Solution, float]:
 
 def _on_more(fitter: Fitter, chosen: Solution) -> Solution:
     """The chosen explanation fitted to more rows, without those that don't fit."""
-    solution = fitter.fit(chosen.explanation, chosen.values)
+    solution = fitter.fit(chosen.explanation, chosen)
     bad = fitter.at(chosen).by_row > 9.0 * fitter.dimensions
     if solution.per_freedom > EXPLAINED and 0 < bad.sum() <= 0.2 * len(bad):
-        solution = fitter.fit(chosen.explanation, chosen.values, np.where(bad, 0.0, 1.0))
+        solution = fitter.fit(chosen.explanation, chosen, np.where(bad, 0.0, 1.0))
     return solution
 
 
@@ -270,29 +265,23 @@ def _layers(solution: Solution, named: Sequence[str]) -> tuple[Layer, ...]:
     return tuple(layer for layer in LAYERS if layer in found)
 
 
-def _places(solution: Solution) -> dict[str, Placed | None]:
-    """Base and tool with their intervals, as far as they were fitted."""
-    errors, found = INTERVAL_95 * solution.errors, solution.explanation
-    placed: dict[str, Placed | None] = {"base": None, "tool": None}
-    for name, T in (("base", solution.Y), ("tool", solution.X)):
-        if name in found.free:
-            size = min(6, len(errors) - len(solution.entries)) if name == "tool" else 6
-            own, errors = errors[:size], errors[size:]
-            placed[name] = Placed(
-                T, float(MM * own[:3].max()), float(np.degrees(own[3:].max())) if size == 6 else np.inf
-            )
-    return placed
+def _placed(solution: Solution, place: Place, half: Mapping[Entry, float]) -> Placed | None:
+    """Base or tool with half its intervals, if it was fitted."""
+    own = {each: width * each.in_unit for each, width in half.items() if each.column.startswith(place)}
+    if not own:
+        return None
+    mm, deg = (max((own[each] for each in own if each.unit == unit), default=np.inf) for unit in ("mm", "deg"))
+    return Placed(getattr(solution.arm, place), mm, deg)
 
 
-def _entries(robot: Robot, solution: Solution) -> tuple[tuple[FoundEntry, ...], tuple[FoundEntry, ...]]:
+def _entries(
+    robot: Robot, solution: Solution, half: Mapping[Entry, float]
+) -> tuple[tuple[FoundEntry, ...], tuple[FoundEntry, ...]]:
     """Entries that are other, and small corrections, the largest first."""
-    errors = INTERVAL_95 * solution.errors[len(solution.errors) - len(solution.entries) :]
-    every = [
-        FoundEntry(
-            each, each.value(robot), each.value(robot) + float(amount) * each.in_unit, float(error) * each.in_unit
-        )
-        for each, amount, error in zip(solution.entries, solution.amounts, errors)
-    ]
+    every = []
+    for each, amount in zip(solution.entries, solution.amounts.tolist()):
+        given = each.value(robot)
+        every.append(FoundEntry(each, given, given + amount * each.in_unit, half[each] * each.in_unit))
     own = len(solution.explanation.entries)
     by_size = sorted(
         every[own:], key=lambda each: -abs(each.found - each.given) / (each.entry.scale * each.entry.in_unit)
@@ -302,7 +291,7 @@ def _entries(robot: Robot, solution: Solution) -> tuple[tuple[FoundEntry, ...], 
 
 def _corrected(robot: Robot, solution: Solution, count: int) -> Robot:
     """The robot as the controller has it: table, joints, base and tool."""
-    found = corrected(robot, solution.entries, solution.amounts)
+    found = solution.arm
     factors, shift = solution.explanation.joints.factors, solution.explanation.joints.shift
     if solution.explanation.joints.faults:
         sizes = np.abs(factors).max(axis=1)
@@ -318,8 +307,6 @@ def _corrected(robot: Robot, solution: Solution, count: int) -> Robot:
         else:
             own = np.eye(robot.joints) if robot.coupling is None else robot.coupling
             found = found.replace(coupling=own @ factors)
-    if solution.explanation.free:
-        found = found.replace(base=solution.Y, tool=solution.X)
     if not (solution.entries or solution.explanation.free or solution.explanation.joints.faults):
         return found
     source = Source(f"Fitted to {count} poses of the controller, starting from {robot.name}", "inferred")
@@ -337,8 +324,8 @@ def _held_out(fitter: Fitter, solution: Solution) -> float | None:
         out = rows[fold::FOLDS]
         weights = solution.rows.astype(float)
         weights[out] = 0.0
-        left = fitter.fit(solution.explanation, solution.values, weights)
-        squares += (left.off[out, :3] ** 2).sum(axis=1).tolist()
+        left = fitter.fit(solution.explanation, solution, weights)
+        squares += (left.left[out, :3] ** 2).sum(axis=1).tolist()
     return float(MM * np.sqrt(np.mean(squares)))
 
 

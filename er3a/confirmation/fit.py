@@ -17,19 +17,21 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.calibration.parameters import parameters_of
-from er3a.comparison.entries import Entry, entry_twists, shifted
+from er3a.calibration.fit import jacobian
+from er3a.calibration.observations import PointObservations
+from er3a.calibration.parameters import corrected, parameters_of, placements_of
+from er3a.calibration.terms import effects
+from er3a.comparison.entries import Entry
 from er3a.confirmation.pairs import ROUNDED, Pairs
 from er3a.finding import Finding
-from er3a.geometry.transforms import exp_rotation, log_rotation, posed, skew, transposed
+from er3a.geometry.transforms import transposed
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
+from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
 Place = Literal["base", "tool"]
-Start = tuple[Reals, Reals, Reals]
-"""Base and tool, (4, 4), and amounts of entries, from which a fit starts."""
 STEPS, HALVINGS = 16, 6
 DONE = 1e-9  # m or rad
 FLOOR = 5e-6
@@ -60,8 +62,7 @@ class JointReading:
         ----------
         q : (N, n), rad or m, the pendant's
         """
-        found: Reals = q @ self.factors.T + self.shift
-        return found
+        return q @ self.factors.T + self.shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,20 +91,21 @@ class State:
 
     Attributes
     ----------
-    Y, X : (4, 4), m, the controller's base and tool; amounts : (k,), m and rad, of ``entries``, those of the
-        explanation first, then those that are off by a little
+    seen : the poses, read as the explanation says
+    arm : as the controller has it: its base and tool, and the table with ``amounts``
+    amounts : (k,), m and rad, of ``entries``, those of the explanation first, then those that are off by a little
     """
 
     explanation: Explanation
+    seen: PointObservations
+    arm: Robot
     entries: tuple[Entry, ...]
-    Y: Reals
-    X: Reals
     amounts: Reals
 
     @property
-    def values(self) -> Start:
-        """From which to start a fit."""
-        return self.Y, self.X, self.amounts
+    def free(self) -> tuple[Entry, ...]:
+        """All that is fitted: base, tool and entries."""
+        return (*placements_of(self.explanation.free, self.seen.oriented), *self.entries)
 
     @property
     def prior(self) -> Reals:
@@ -111,23 +113,21 @@ class State:
         own = len(self.explanation.entries)
         return np.concatenate([np.zeros(own), np.full(len(self.entries) - own, 1 / SMALL)])
 
-    def stepped(self, step: Reals, turned: bool) -> State:
-        """The state after a step of all that is free.
+    def stepped(self, step: Reals) -> State:
+        """The state after a step.
 
         Parameters
         ----------
-        step : (p,), m and rad, of base, tool and entries
-        turned : whether the tool's rotation is free, too
+        step : (p,), m and rad, of all that is free
         """
-        Y, X = self.Y, self.X
-        if "base" in self.explanation.free:
-            Y = posed(exp_rotation(step[3:6]) @ Y[:3, :3], Y[:3, 3] + step[:3])
-            step = step[6:]
-        if "tool" in self.explanation.free:
-            turn = exp_rotation(step[3:6]) if turned else np.eye(3)
-            X = posed(X[:3, :3] @ turn, X[:3, 3] + step[:3])
-            step = step[6 if turned else 3 :]
-        return replace(self, Y=Y, X=X, amounts=self.amounts + step)
+        own = step[len(step) - len(self.entries) :]
+        return replace(self, arm=corrected(self.arm, self.free, step), amounts=self.amounts + own)
+
+    def off(self) -> Reals:
+        """Differences (N, 6), m and rad, model minus controller; 0 where no orientation is given."""
+        found = np.zeros(self.seen.seen.shape)
+        found[self.seen.seen] = (self.seen.predict(self.arm) - self.seen.values_mm) / MM
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,14 +136,14 @@ class Solution(State):
 
     Attributes
     ----------
-    off : (N, 6), m and rad, model minus controller, position and rotation vector, 0 where no orientation is given
+    left : (N, 6), the differences at the pairs
     by_row : (N,), squares of these in standard deviations
     freedom : degrees of freedom; J : (r, p), derivatives of what is left by base, tool and entries, as far as free, in
         standard deviations
     rows : (N,) bool, those that were fitted
     """
 
-    off: Reals
+    left: Reals
     by_row: Reals
     freedom: int
     J: Reals
@@ -163,13 +163,15 @@ class Solution(State):
     @property
     def rms(self) -> float:
         """Root mean square of the distances, m, of the rows that were fitted."""
-        return float(np.sqrt((self.off[self.rows, :3] ** 2).sum(axis=1).mean()))
+        return float(np.sqrt((self.left[self.rows, :3] ** 2).sum(axis=1).mean()))
 
     @property
     def errors(self) -> Reals:
-        """(p,), standard deviations of base, tool and entries, as far as free, m and rad."""
-        found: Reals = np.sqrt(np.diag(np.linalg.pinv(self.J.T @ self.J, rcond=1e-14, hermitian=True)))
-        return found
+        """(p,), standard deviations of all that is free, m and rad; of the base by the axes of the controller."""
+        J, turn = self.J.copy(), self.arm.base[:3, :3].T
+        for part in (slice(3), slice(3, 6)) if "base" in self.explanation.free else ():
+            J[:, part] = J[:, part] @ turn
+        return np.sqrt(np.diag(np.linalg.pinv(J.T @ J, rcond=1e-14, hermitian=True)))
 
     @property
     def per_freedom(self) -> float:
@@ -182,8 +184,6 @@ class Fitter:
 
     def __init__(self, robot: Robot, pairs: Pairs):
         self.robot, self.pairs = robot, pairs
-        self.bare = robot.replace(base=np.eye(4), tool=np.eye(4))
-        self.table = tables_of(robot)
         self.every = parameters_of(robot, "all_entries")
         self.widen = 1.0
 
@@ -192,45 +192,57 @@ class Fitter:
         """Numbers of a pose: 6, or 3 without orientations."""
         return 6 if self.pairs.turns else 3
 
-    def flanges(
-        self, joints: Sequence[JointReading], entries: Sequence[Entry] = (), amounts: Reals | None = None
-    ) -> Reals:
-        """Flanges of tables with amounts added, at the pairs' joint values.
+    def flanges(self, joints: Sequence[JointReading]) -> Reals:
+        """Flanges by the table at the pairs' joint values.
 
         Parameters
         ----------
         joints : M ways in which these are read
-        amounts : (H, k), m and rad, of k entries; none by default
 
         Returns
         -------
-        F : (H, M, N, 4, 4), m, from the arm's base
+        F : (M, N, 4, 4), m, from the arm's base
         """
-        amounts = np.zeros((1, 0)) if amounts is None else amounts
         u = row_values(self.robot, np.concatenate([each.of(self.pairs.q) for each in joints]))
-        F = frames_of(shifted(self.table, entries, amounts), self.bare, u)[:, :, -1]
-        found: Reals = F.reshape(len(amounts), len(joints), -1, 4, 4)
-        return found
+        F = frames_of(tables_of(self.robot), self.robot.replace(base=np.eye(4)), u)[0, :, -1]
+        return F.reshape(len(joints), -1, 4, 4)
 
-    def flanges_at(self, state: State) -> Reals:
-        """(N, 4, 4), m, from the arm's base."""
-        found: Reals = self.flanges([state.explanation.joints], state.entries, state.amounts[None])[0, 0]
-        return found
+    def seen(self, explanation: Explanation) -> PointObservations:
+        """The pairs as an explanation reads them, as observations of the tool."""
+        count, pairs = len(self.pairs), self.pairs
+        seen = np.tile(np.arange(6) < self.dimensions, (count, 1))
+        xyz_mm = MM * explanation.factor * pairs.xyz
+        return PointObservations(
+            row_values=row_values(self.robot, explanation.joints.of(pairs.q)),
+            on_tool=np.ones(count, dtype=bool),
+            seen=seen,
+            values_mm=np.hstack([xyz_mm, np.zeros((count, 3))])[seen],
+            deviation_mm=np.ones(int(seen.sum())),
+            deviation_known=True,
+            lines=pairs.lines,
+            free=(),
+            touched=np.full(count, -1),
+            orientations=pairs.turns.get(explanation.form, np.tile(np.eye(3), (count, 1, 1))),
+        )
 
-    def twists(self, state: State, by: Sequence[Entry]) -> Reals:
-        """Twists (N, 6, k) of the controller's tool point (m) and rotation by k entries, in the controller's axes."""
-        table = shifted(self.table, state.entries, state.amounts[None])
-        u = row_values(self.robot, state.explanation.joints.of(self.pairs.q))
-        points = (self.flanges_at(state) @ state.X)[:, :3, 3]
-        found = entry_twists(table, self.bare, u, by, points).reshape(len(u), 2, 3, len(by))
-        return np.asarray(state.Y[:3, :3] @ found).reshape(len(u), 6, len(by))
+    def state(self, explanation: Explanation, near: State | Robot, entries: tuple[Entry, ...]) -> State:
+        """An explanation with values to start from.
 
-    def fit(self, explanation: Explanation, start: Start, weights: Reals | None = None) -> Solution:
+        Parameters
+        ----------
+        near : whose base and tool are taken where they are free, and whose amounts of entries, 0 of others
+        """
+        arm, known = (near, {}) if isinstance(near, Robot) else (near.arm, dict(zip(near.entries, near.amounts)))
+        amounts = np.array([known.get(each, 0.0) for each in entries])
+        placed = self.robot.replace(**{place: getattr(arm, place) for place in explanation.free})
+        return State(explanation, self.seen(explanation), corrected(placed, entries, amounts), entries, amounts)
+
+    def fit(self, explanation: Explanation, near: State | Robot, weights: Reals | None = None) -> Solution:
         """The values that fit best.
 
         Parameters
         ----------
-        start : Y, X (4, 4), and amounts of the explanation's first entries
+        near : where to start, as of :meth:`state`
         weights : (N,), of rows; 0 leaves one out
 
         Returns
@@ -240,17 +252,15 @@ class Fitter:
         entries = explanation.entries
         if explanation.small:
             entries = (*entries, *(each for each in self.every if each not in entries))
-        amounts = np.zeros(len(entries))
-        amounts[: len(start[2])] = start[2]
-        state = State(explanation, entries, *start[:2], amounts)
+        state = self.state(explanation, near, entries)
         weights = np.ones(len(self.pairs)) if weights is None else weights
         by_row = weights[:, None, None]
         whiten = self._whitening(state) * by_row
         left = self._left(state, whiten)
-        for number in range(STEPS if explanation.free or entries else 0):
+        for number in range(STEPS if state.free else 0):
             step = np.asarray(np.linalg.lstsq(self._jacobian(state, whiten), -left, rcond=SINGULAR)[0], np.float64)
             for halving in range(HALVINGS):
-                tried = state.stepped(step * 0.5**halving, self.dimensions == 6)
+                tried = state.stepped(step * 0.5**halving)
                 now = self._left(tried, whiten)
                 if now @ now < left @ left:
                     break
@@ -268,7 +278,7 @@ class Fitter:
         own = J.shape[1] - len(entries) + len(explanation.entries)
         freedom = max(int(rows.sum()) * self.dimensions - own, 1)
         none: Reals = np.zeros(0)
-        return self.at(Solution(**vars(state), off=none, by_row=none, freedom=freedom, J=J, rows=rows), rows)
+        return self.at(Solution(**vars(state), left=none, by_row=none, freedom=freedom, J=J, rows=rows), rows)
 
     def linear(self, state: State) -> tuple[Reals, Reals]:
         """Derivatives of the differences, and these, in standard deviations.
@@ -297,9 +307,8 @@ class Fitter:
         own, rest, left : (r, k), derivatives of the differences, (r, k), the part of these that nothing which is free
             takes up, and (r,), the differences, all in standard deviations
         """
-        entries, amounts = (*state.entries, *more), np.append(state.amounts, np.zeros(len(more)))
-        explanation = replace(state.explanation, entries=entries, small=False)
-        J, left = self.linear(State(explanation, entries, state.Y, state.X, amounts))
+        amounts = np.append(state.amounts, np.zeros(len(more)))
+        J, left = self.linear(replace(state, entries=(*state.entries, *more), amounts=amounts))
         free, own = np.split(J, [J.shape[1] - len(more)], axis=1)
         Q = np.linalg.qr(free)[0]
         return own, own - Q @ (Q.T @ own), left
@@ -312,16 +321,17 @@ class Fitter:
         solution : of the same robot, fitted to any pairs
         rows : (N,) bool, those of the pairs that were fitted; default: all
         """
-        off = self._off(solution)
-        by_row = (np.einsum("nij,nj->ni", self._whitening(solution), off) ** 2).sum(axis=1)
-        return replace(solution, off=off, by_row=by_row, rows=np.ones(len(off), dtype=bool) if rows is None else rows)
+        here = replace(solution, seen=self.seen(solution.explanation))
+        left = here.off()
+        by_row = (np.einsum("nij,nj->ni", self._whitening(here), left) ** 2).sum(axis=1)
+        return replace(here, left=left, by_row=by_row, rows=np.ones(len(left), dtype=bool) if rows is None else rows)
 
     def expected(self, solution: Solution) -> tuple[float, float]:
         """What digits explain of a pose's distance (m) and turn (rad), root mean square.
 
         Parameters
         ----------
-        solution : of the same robot
+        solution : of these pairs
         """
         size = self.dimensions
         by_place = np.linalg.inv(self._whitening(solution)[:, :size, :size])
@@ -330,11 +340,10 @@ class Fitter:
 
     def _whitening(self, state: State) -> Reals:
         """(N, 6, 6), which make standard deviations of differences; rows of 0 for orientations that are not given."""
-        robot, pairs = self.robot, self.pairs
-        moving = [Entry("d" if slides else "offset", k + 1) for k, slides in enumerate(robot.sliding)]
+        robot, pairs, seen = self.robot, self.pairs, state.seen
         coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        by_joint = (robot.direction[:, None] * coupling) @ state.explanation.joints.factors
-        J = self.twists(state, moving) @ by_joint
+        by_joint = coupling @ state.explanation.joints.factors
+        J = effects(state.arm, seen.row_values, seen.points(state.arm)) @ by_joint
         J *= (pairs.q_digit * ROUNDED)[:, None]
         turned = np.repeat(pairs.turn_digit, 3, axis=1)
         own = np.concatenate([pairs.xyz_digit * abs(state.explanation.factor), turned], axis=1) * ROUNDED
@@ -345,37 +354,16 @@ class Fitter:
         found[:, :size, :size] = np.linalg.inv(np.linalg.cholesky(covariance[:, :size, :size])) / self.widen
         return found
 
-    def _off(self, state: State) -> Reals:
-        """Differences (N, 6), m and rad."""
-        M = state.Y @ self.flanges_at(state) @ state.X
-        off = np.zeros((len(M), 6))
-        off[:, :3] = M[:, :3, 3] - state.explanation.factor * self.pairs.xyz
-        if self.pairs.turns:
-            off[:, 3:] = log_rotation(M[:, :3, :3] @ transposed(self.pairs.turns[state.explanation.form]))
-        return off
-
     def _left(self, state: State, whiten: Reals) -> Reals:
         """Differences, and small corrections, in standard deviations."""
-        left = np.einsum("nij,nj->ni", whiten, self._off(state))[:, : self.dimensions].ravel()
+        left = np.einsum("nij,nj->ni", whiten, state.off())[:, : self.dimensions].ravel()
         return np.concatenate([left, state.prior * state.amounts])
 
     def _jacobian(self, state: State, whiten: Reals) -> Reals:
-        """Derivatives of what is left by base and tool, as far as free, and by entries."""
-        F, X, size = self.flanges_at(state), state.X, self.dimensions
-        R = state.Y[:3, :3] @ F[:, :3, :3]
-        parts = [np.zeros((len(F), 6, 0))]
-        if "base" in state.explanation.free:
-            base = np.zeros((len(F), 6, 6))
-            base[:, :3, :3] = base[:, 3:, 3:] = np.eye(3)
-            base[:, :3, 3:] = -skew(R @ X[:3, 3] + F[:, :3, 3] @ state.Y[:3, :3].T)
-            parts.append(base)
-        if "tool" in state.explanation.free:
-            tool = np.zeros((len(F), 6, 6))
-            tool[:, :3, :3], tool[:, 3:, 3:] = R, R @ X[:3, :3]
-            parts.append(tool[..., :size])
-        if state.entries:
-            parts.append(self.twists(state, state.entries))
-        columns = np.concatenate(parts, axis=-1)
-        J = np.einsum("nij,njk->nik", whiten, columns)[:, :size].reshape(len(F) * size, columns.shape[-1])
+        """Derivatives of what is left by all that is free."""
+        size = self.dimensions
+        shape = len(whiten), size, len(state.free)
+        columns = jacobian(state.arm, state.free, state.seen).reshape(shape) / MM
+        J = (whiten[:, :size, :size] @ columns).reshape(shape[0] * size, shape[2])
         prior = state.prior[:, None]
         return np.concatenate([J, prior * np.eye(len(prior), J.shape[1], J.shape[1] - len(prior))])

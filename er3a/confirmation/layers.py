@@ -15,10 +15,11 @@ from itertools import combinations
 import numpy as np
 
 from er3a.comparison.entries import Entry
-from er3a.confirmation.fit import Explanation, Fitter, Place, Solution, Start
+from er3a.confirmation.fit import Explanation, Fitter, Place, Solution, State
 from er3a.confirmation.screen import Near, joined, nearest, plain, single_readings
 from er3a.geometry.transforms import inverted, nearest_rotations, posed
 from er3a.numerics.arrays import Reals
+from er3a.robots.robot import Robot
 
 EXPLAINED = 4.0
 """Squares per degree of freedom: what is left is less than twice what digits explain."""
@@ -98,9 +99,9 @@ class Attempts:
         every = (each for each in self.found if each.per_freedom <= EXPLAINED and each.plausible)
         return sorted(every, key=self.total)
 
-    def add(self, explanation: Explanation, start: Start, weights: Reals | None = None) -> Solution:
+    def add(self, explanation: Explanation, near: State | Robot, weights: Reals | None = None) -> Solution:
         """Fit an explanation and keep it."""
-        self.found.append(self.fitter.fit(explanation, start, weights))
+        self.found.append(self.fitter.fit(explanation, near, weights))
         return self.found[-1]
 
 
@@ -117,7 +118,7 @@ def search(fitter: Fitter) -> Attempts:
     """
     robot, found = fitter.robot, Attempts(fitter, [])
     for form in found.named:
-        found.add(Explanation(plain(robot), form), (robot.base, robot.tool, np.zeros(0)))
+        found.add(Explanation(plain(robot), form), robot)
     if found.explained():
         return found
     candidates = _candidates(fitter, found)
@@ -173,7 +174,7 @@ def _with_frames(found: Attempts, near: Near) -> Iterator[tuple[Solution, Soluti
     unit."""
     fitter = found.fitter
     robot, pairs = fitter.robot, fitter.pairs
-    F = fitter.flanges([near.joints])[0, 0]
+    F = fitter.flanges([near.joints])[0]
     for factor in _factors(near):
         for free in PLACES:
             Y, X = near.Y, near.X
@@ -183,9 +184,7 @@ def _with_frames(found: Attempts, near: Near) -> Iterator[tuple[Solution, Soluti
                     X = _middle(inverted(robot.base @ F) @ C)
                 if free == ("base",):
                     Y = _middle(C @ inverted(F @ robot.tool))
-            explanation = Explanation(near.joints, near.form, factor, free)
-            Y, X = Y if "base" in free else robot.base, X if "tool" in free else robot.tool
-            found.add(explanation, (Y, X, np.zeros(0)))
+            found.add(Explanation(near.joints, near.form, factor, free), robot.replace(base=Y, tool=X))
         yield found.found[-len(PLACES)], found.found[-1]
 
 
@@ -209,12 +208,12 @@ def _without_rows(found: Attempts, solution: Solution) -> None:
     for _ in range(ROUNDS):
         size = max(float(np.median(solution.by_row)), 2.0 * numbers)
         weights = 1 / np.sqrt(1 + solution.by_row / size)
-        last, solution = solution, found.fitter.fit(solution.explanation, solution.values, weights)
+        last, solution = solution, found.fitter.fit(solution.explanation, solution, weights)
         if (np.abs(last.by_row - solution.by_row) < 0.1 + 0.01 * solution.by_row).all():
             break
     bad = solution.by_row > ROW_OFF * numbers
     if 0 < bad.sum() <= most:
-        found.add(solution.explanation, solution.values, np.where(bad, 0.0, 1.0))
+        found.add(solution.explanation, solution, np.where(bad, 0.0, 1.0))
 
 
 def _with_entries(found: Attempts, states: Iterable[Solution]) -> list[Solution]:
@@ -224,20 +223,16 @@ def _with_entries(found: Attempts, states: Iterable[Solution]) -> list[Solution]
         for more in _promising(found.fitter, state):
             entries = (*state.explanation.entries, *more)
             if len(entries) <= MOST:
-                explanation = replace(state.explanation, entries=entries)
-                amounts = np.concatenate([state.amounts[: len(state.explanation.entries)], np.zeros(len(more))])
-                reached.append(_with_fewer_frames(found, found.add(explanation, (state.Y, state.X, amounts))))
+                solution = found.add(replace(state.explanation, entries=entries), state)
+                reached.append(_with_fewer_frames(found, solution))
     return sorted(reached, key=lambda each: each.chi2)[:STATES]
 
 
 def _with_fewer_frames(found: Attempts, solution: Solution) -> Solution:
     """A solution that explains, with one frame less if it still does."""
-    robot = found.fitter.robot
-    if solution.per_freedom > EXPLAINED:
-        return solution
-    for free in PLACES[: 3 if solution.explanation.free == BOTH else 0]:
-        Y, X = solution.Y if "base" in free else robot.base, solution.X if "tool" in free else robot.tool
-        found.add(replace(solution.explanation, free=free), (Y, X, solution.amounts))
+    if solution.per_freedom <= EXPLAINED and solution.explanation.free == BOTH:
+        for free in PLACES[:3]:
+            found.add(replace(solution.explanation, free=free), solution)
     return solution
 
 
@@ -265,33 +260,25 @@ def _promising(fitter: Fitter, state: Solution) -> list[tuple[Entry, ...]]:
 def _with_small(found: Attempts, starts: Sequence[Solution], states: Sequence[Solution]) -> None:
     """Small corrections of all entries, with the entries that are off by more free."""
     for start in [*starts, *sorted(states, key=lambda each: each.chi2)[: 2 * STATES]]:
-        solution = found.add(replace(start.explanation, small=True), start.values)
+        solution = found.add(replace(start.explanation, small=True), start)
         for _ in range(MOST):
-            own = len(solution.explanation.entries)
             if solution.plausible:
                 break
-            solution = _released(found, solution, own + int(np.abs(solution.amounts[own:]).argmax()))
+            own = solution.explanation.entries
+            largest = len(own) + int(np.abs(solution.amounts[len(own) :]).argmax())  # it may be off by any amount
+            entries = (*own, solution.entries[largest])
+            solution = found.add(replace(solution.explanation, entries=entries), solution)
         if solution.per_freedom <= EXPLAINED:
             _with_fewer_frames(found, solution)
             _with_fewer_entries(found, solution)
 
 
-def _released(found: Attempts, solution: Solution, k: int) -> Solution:
-    """The solution with one more entry that may be off by any amount."""
-    own = solution.explanation.entries
-    order = [*range(len(own)), k, *(i for i in range(len(own), len(solution.amounts)) if i != k)]
-    explanation = replace(solution.explanation, entries=(*own, solution.entries[k]))
-    return found.add(explanation, (solution.Y, solution.X, solution.amounts[order]))
-
-
 def _with_fewer_entries(found: Attempts, solution: Solution) -> None:
     """The solution with its large corrections alone, and with one of them small as the others."""
     own = solution.explanation.entries
-    if not own:
-        return
-    alone = replace(solution.explanation, small=False)
-    _with_fewer_frames(found, found.add(alone, (solution.Y, solution.X, solution.amounts[: len(own)])))
+    if own:
+        alone = replace(solution.explanation, small=False)
+        _with_fewer_frames(found, found.add(alone, solution))
     for entry in own:
-        kept = [k for k in range(len(own)) if own[k] != entry]
-        explanation = replace(solution.explanation, entries=tuple(own[k] for k in kept))
-        found.add(explanation, (solution.Y, solution.X, solution.amounts[kept]))
+        others = tuple(each for each in own if each != entry)
+        found.add(replace(solution.explanation, entries=others), solution)

@@ -16,7 +16,7 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.collision.along import clearance
-from er3a.confirmation.fit import SMALL, Explanation, Fitter, State
+from er3a.confirmation.fit import SMALL, Explanation, Fitter
 from er3a.confirmation.pairs import Pairs
 from er3a.confirmation.screen import plain
 from er3a.errors import Er3aError
@@ -97,5 +97,5 @@ def _effects(robot: Robot, q: Reals) -> Reals:
     digits = np.full(robot.joints, np.radians(DIGIT_DEG)), np.full(3, DIGIT_M), float(np.radians(DIGIT_DEG))
     fitter = Fitter(robot, Pairs(q, forward(robot, q)[:, :3, 3], turns, 1, *digits))
     explanation = Explanation(plain(robot), "", 1.0, ("base", "tool"), fitter.every)
-    J, _ = fitter.linear(State(explanation, fitter.every, robot.base, robot.tool, np.zeros(len(fitter.every))))
+    J, _ = fitter.linear(fitter.state(explanation, robot, fitter.every))
     return J.reshape(len(q), 6, -1) * SMALL

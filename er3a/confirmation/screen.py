@@ -14,7 +14,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 
@@ -77,27 +77,26 @@ def single_readings(robot: Robot) -> list[JointReading]:
     -------
     readings : senses, what is counted from the ground, swapped columns, quarter turns of zeros, units of angles
     """
-    n, turning = robot.joints, np.flatnonzero(~robot.slides).tolist()
+    n, turning, eye = robot.joints, ~robot.slides, np.eye(robot.joints)
     found = []
 
-    def add(fault: Finding, entries: Iterable[tuple[int, int, float]] = (), shift: Reals | float = 0.0) -> None:
-        S = np.eye(n)
-        for i, j, value in entries:
-            S[i, j] = value
-        found.append(JointReading(S, np.zeros(n) + shift, (fault,)))
+    def add(fault: Finding, factors: Reals = eye, shift: Reals | None = None) -> None:
+        found.append(JointReading(factors, np.zeros(n) if shift is None else shift, (fault,)))
 
     for j in range(n):
-        add(fact("turns_other_way", joint=j + 1), [(j, j, -1.0)])
+        add(fact("turns_other_way", joint=j + 1), eye - 2 * np.outer(eye[j], eye[j]))
     for low, sign, up in product(range(n - 1), (-1.0, 1.0), (True, False)):
         j, i = (low + 1, low) if up else (low, low + 1)
-        if (i in turning) == (j in turning):
-            add(fact("counted_from", joint=j + 1, by=i + 1, factor=sign), [(j, i, sign)])
+        if turning[i] == turning[j]:
+            add(fact("counted_from", joint=j + 1, by=i + 1, factor=sign), eye + sign * np.outer(eye[j], eye[i]))
     for i, j in combinations(range(n), 2):
-        add(fact("columns_swapped", first=i + 1, second=j + 1), [(i, i, 0.0), (j, j, 0.0), (i, j, 1.0), (j, i, 1.0)])
-    for j, deg in product(turning, (180.0, 90.0, -90.0)):
-        add(fact("zero_elsewhere", joint=j + 1, deg=deg), shift=np.radians(deg) * np.eye(n)[j])
+        swapped = eye.copy()
+        swapped[[i, j]] = eye[[j, i]]
+        add(fact("columns_swapped", first=i + 1, second=j + 1), swapped)
+    for j, deg in product(np.flatnonzero(turning).tolist(), (180.0, 90.0, -90.0)):
+        add(fact("zero_elsewhere", joint=j + 1, deg=deg), shift=np.radians(deg) * eye[j])
     for unit, size in (("rad", 180 / np.pi), ("deg", np.pi / 180)):
-        add(fact("joints_in", unit=unit), [(j, j, size) for j in turning])
+        add(fact("joints_in", unit=unit), np.diag(np.where(turning, size, 1.0)))
     return found
 
 
@@ -153,7 +152,7 @@ def nearest(fitter: Fitter, readings: Sequence[JointReading], forms: Sequence[st
 
 def _products(fitter: Fitter, readings: Sequence[JointReading], form: str) -> tuple[Reals, Reals]:
     """The matrices (H, 9, 9) of the bilinear forms, and the flanges."""
-    F, C = fitter.flanges(readings)[0], fitter.pairs.turns[form]
+    F, C = fitter.flanges(readings), fitter.pairs.turns[form]
     K = C.reshape(-1, 9).T @ F[..., :3, :3].reshape(*F.shape[:2], 9)  # (H, ab, cd)
     K = K.reshape(-1, 3, 3, 3, 3).transpose(0, 1, 3, 4, 2).reshape(-1, 9, 9)  # (a, c), (d, b)
     return K / len(C), F
@@ -182,7 +181,7 @@ def _positions_alone(fitter: Fitter, readings: Sequence[JointReading]) -> list[N
     found = []
     for first in range(0, len(readings), BLOCK):
         some = readings[first : first + BLOCK]
-        F, m = fitter.flanges(some)[0], fitter.pairs.xyz
+        F, m = fitter.flanges(some), fitter.pairs.xyz
         by_place = np.einsum("ij,nk->nijk", np.eye(3), m).reshape(len(m), 3, 9)
         by_place = np.broadcast_to(by_place, (len(F), *by_place.shape))
         shift = np.broadcast_to(np.eye(3), F[..., :3, :3].shape)

@@ -32,11 +32,11 @@ from er3a.comparison.mechanism import (
 from er3a.diagnosis.faults import Fault, Faults, limit_repairs, rounded, wrong_number
 from er3a.diagnosis.fitting import MEETS, lowered
 from er3a.finding import fact
-from er3a.geometry.transforms import exp_rotation, posed, translation
+from er3a.geometry.transforms import exp_rotation, posed
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.table_batch import robot_of, tables_of
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.predict import joints_of, predict_tables
 from er3a.references.quantities import (
     COORDINATES,
@@ -218,7 +218,7 @@ def _fitted_to(
         tried.append((round(float(np.abs(off(arm)).max()), 3), reversed_count, arm))
     least = min(worst for worst, _, _ in tried)
     best = min((each for each in tried if each[0] <= least + 0.5), key=lambda each: each[1])[2]
-    best = _fitted(best, wrong, off)
+    best = _fitted(best, [*(Entry("offset", joint) for joint in range(2, robot.joints)), *wrong], off)
     best = _plain(robot, best, off, tolerances)
     if np.abs(off(best)).max() > MEETS:
         return None
@@ -302,15 +302,7 @@ def _with_flange(robot: Robot, stated: Sequence[Reference]) -> Robot:
     own = [r for r in stated if isinstance(r.quantity, PointCoordinate) and r.quantity.point == "flange"]
     if not own:
         return robot
-    off = _misfit_of(own)
-
-    def moved(shift: Reals) -> Robot:
-        return robot.replace(flange=robot.flange @ translation(*shift))
-
-    def model(shifts: Reals, _: Integers) -> Reals:
-        return np.array([off(moved(shift)) for shift in shifts])
-
-    return moved(lowered(model, np.zeros((1, 3)), passes=ROUNDS)[0][0])
+    return _fitted(robot, (), _misfit_of(own), np.array([[k // 3 != SHIFT_OF_FLANGE for k in range(12)]]))
 
 
 def _changed(robot: Robot, numbers: Sequence[Entry], x: Reals) -> Robot:
@@ -321,14 +313,17 @@ def _changed(robot: Robot, numbers: Sequence[Entry], x: Reals) -> Robot:
     return robot_of(shifted(tables_of(robot), numbers, x[None, 12:]), 0, robot.replace(base=base, flange=flange))
 
 
-def _fitted(robot: Robot, wrong: Sequence[Entry], off: Misfit) -> Robot:
-    """Base, flange, inner zeros and wrong entries fitted, from an arm that nearly meets the references."""
-    numbers = [*(Entry("offset", joint) for joint in range(2, robot.joints)), *wrong]
+SHIFT_OF_FLANGE = 2
+"""Of the four threes of base and flange: shift and turn of each."""
+
+
+def _fitted(robot: Robot, numbers: Sequence[Entry], off: Misfit, held: Flags | None = None) -> Robot:
+    """Base, flange and entries fitted, but for those held (1, 12 + k), from an arm that nearly meets the references."""
 
     def model(amounts: Reals, _: Integers) -> Reals:
         return np.array([off(_changed(robot, numbers, x)) for x in amounts])
 
-    return _changed(robot, numbers, lowered(model, np.zeros((1, 12 + len(numbers))), passes=ROUNDS)[0][0])
+    return _changed(robot, numbers, lowered(model, np.zeros((1, 12 + len(numbers))), held, passes=ROUNDS)[0][0])
 
 
 def _plain(given: Robot, fitted: Robot, off: Misfit, tolerances: Tolerances) -> Robot:

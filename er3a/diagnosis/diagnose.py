@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
-from er3a.diagnosis import conclusions
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.diagnosis.defined_otherwise import conventions_of, counted_from_ground
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.diagnosis.fitting import MEETS
@@ -31,21 +30,38 @@ from er3a.robots.robot import Robot
 MOSTLY = 0.05
 
 
+@dataclass(frozen=True)
+class RankedHypothesis:
+    """A fault or two that would explain the disagreement.
+
+    Attributes
+    ----------
+    faults : one, or two; of conventions (zeros, directions, base, flange) as many as differ
+    residual_before, residual_after : largest difference over the references of that unit; coordinates of one point are
+        taken together, as a distance
+    unit : mm, or deg where all lengths agree before and after
+    explains : whether all references are met within their uncertainty
+    half_widths : largest difference that is left, in half-widths of its reference
+    indistinguishable_from : the faults of other hypotheses that no reference tells from this one; if it explains, all
+        others that explain with as few faults
+    score : what those that don't explain are ranked by, see :mod:`er3a.diagnosis.ranking`; smaller is better
+    """
+
+    faults: Faults
+    residual_before: float
+    residual_after: float
+    unit: Unit
+    explains: bool
+    half_widths: float
+    indistinguishable_from: tuple[Faults, ...]
+    score: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Hypothesis(ByValue, Displayed, conclusions.RankedHypothesis):
+class Hypothesis(ByValue, Displayed, RankedHypothesis):
     """A fault or two that would explain the disagreement, and ``corrected``, the robot without the faults."""
 
     corrected: Robot
-
-    def sheet(self) -> Sheet:
-        """What the notebook shows: the faults, and the greatest difference before and after, in the unit named.
-
-        Returns
-        -------
-        sheet : one line
-        """
-        remains = f"{shortly(self.residual_before)} -> {shortly(self.residual_after)} {self.unit}"
-        return Sheet(f"Hypothesis: {shortly(self.faults)}; greatest difference {remains}")
 
 
 class Diagnosis(list[Hypothesis], Displayed):
@@ -84,14 +100,13 @@ class Diagnosis(list[Hypothesis], Displayed):
             (place + 1, each.faults, each.residual_before, each.residual_after, each.unit, each.explains)
             for place, each in enumerate(self)
         )
-        shown, left_out = first_rows(rows, len(self))
         heading = f"Diagnosis by {self.references} references, {self.tried} hypotheses tried"
         facts = {"reach that is missed": len(self.missed) or "", "not examined": ", ".join(self.not_examined)}
-        return Sheet(
+        return Sheet.of_table(
             f"{heading}: {shortly(self.conclusion)}",
             ("place", "faults", "before", "after", "unit", "explains all"),
-            shown,
-            left_out,
+            rows,
+            len(self),
             tuple(f"{name}: {value}" for name, value in facts.items() if value),
         )
 

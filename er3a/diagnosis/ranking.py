@@ -128,8 +128,7 @@ class Case:
         return repairs_of(self.given, self.references)
 
     def _residual(self, tables: Tables) -> Reals:
-        residual: Reals = (self.difference(tables) / self.uncertainty)[:, self._about_shape]
-        return residual
+        return (self.difference(tables) / self.uncertainty)[:, self._about_shape]
 
     @cached_property
     def _about_shape(self) -> Flags:

@@ -14,8 +14,7 @@ from er3a.calibration import calibrate as calibration
 from er3a.calibration.calibrate import Calibration
 from er3a.calibration.fit import aligned
 from er3a.calibration.observations import PLACEMENTS, Measurement, TouchKind, check_poses
-from er3a.calibration.outcomes import FixedName
-from er3a.calibration.parameters import all_parameters, corrected
+from er3a.calibration.parameters import FixedName, all_parameters, corrected
 from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm, starting_table, terms_of
 from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
 from er3a.errors import ArgumentError, InputError

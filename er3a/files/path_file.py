@@ -268,8 +268,7 @@ def _row_joints(path: Path, rows: list[dict[str, Any]], names: tuple[str, ...]) 
     values = np.array([[row[name] for name in names] for row in rows])
     if turning:
         _block(path, rows, turning)
-    q: Reals = np.where([name.endswith("_mm") for name in names], values / 1000, np.radians(values))
-    return q
+    return np.where([name.endswith("_mm") for name in names], values / 1000, np.radians(values))
 
 
 def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:

@@ -383,8 +383,7 @@ def _seen(asked: Asked, table: Tables, entries: Sequence[Entry]) -> list[int]:
     wide = np.array([WIDEST_M if entry.unit == "mm" else WIDEST_RAD for entry in entries])
     steps = random.uniform(-1, 1, k) * wide * WIDTHS[1] + np.concatenate([np.zeros((1, k)), 1e-6 * np.eye(k)])
     off = asked.near_off(shifted(table, entries, steps))
-    found: list[int] = np.flatnonzero(np.abs(off[1:] - off[0]).max(axis=1, initial=0.0) > REACTS).tolist()
-    return found
+    return np.flatnonzero(np.abs(off[1:] - off[0]).max(axis=1, initial=0.0) > REACTS).tolist()
 
 
 def _spread(region: Region, own: Reals, start: Reals) -> tuple[Reals, Reals]:

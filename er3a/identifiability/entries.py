@@ -118,8 +118,7 @@ class Gauge:
         -------
         support : (k,) bool
         """
-        found: Flags = np.asarray((np.abs(self.directions) > NOTHING).any(axis=0))
-        return found
+        return np.asarray((np.abs(self.directions) > NOTHING).any(axis=0))
 
 
 def gauge_of(robot: Robot, entries: Sequence[Entry]) -> Gauge:

@@ -267,5 +267,4 @@ class ToolRange:
         )
 
     def _tool(self, tables: Tables, q: Reals) -> Reals:
-        T: Reals = frames_of(tables, self.robot, q)[:, :, -1] @ self.robot.tool
-        return T
+        return frames_of(tables, self.robot, q)[:, :, -1] @ self.robot.tool

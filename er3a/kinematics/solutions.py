@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.errors import with_extra
 from er3a.finding import Finding, fact, is_one
-from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
@@ -321,13 +320,3 @@ class Target(ByValue, Displayed):
     def q_ref(self) -> Reals:
         """``q_ref_deg`` in rad, or m of prismatic joints, (n,)."""
         return np.radians(self.q_ref_deg) if self.joints_before is None else self.joints_before
-
-    def sheet(self) -> Sheet:
-        """A line for printing: name, position (mm) and roll, pitch, yaw (deg).
-
-        Returns
-        -------
-        sheet : without rows
-        """
-        xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * self.T[:3, 3], np.degrees(rpy_of(self.T))))
-        return Sheet(f"Target {self.name}: xyz_mm {xyz}; rpy_deg {rpy}")

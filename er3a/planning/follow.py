@@ -34,7 +34,7 @@ from itertools import product
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.by_value import ByValue, Displayed
 from er3a.errors import PoseError
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import arm_length
@@ -90,8 +90,7 @@ class Branches:
     @property
     def reached(self) -> Flags:
         """(N, 8) bool, whether a branch has a solution."""
-        reached: Flags = np.isfinite(self.q[..., 0])
-        return reached
+        return np.isfinite(self.q[..., 0])
 
 
 def branches_along(robot: Robot, line: ToolPath, t: Reals) -> Branches:
@@ -331,18 +330,6 @@ class Followed(ByValue, Displayed):
     start_turn: Reals
     jumps: tuple[BranchJump, ...]
 
-    def sheet(self) -> Sheet:
-        """What the notebook shows: times in s, and joints in degrees.
-
-        Returns
-        -------
-        sheet : a row for each grid point
-        """
-        rows = np.column_stack([self.t, np.degrees(self.q)])
-        found = f"Joints along a line: {len(self.t)} rows over {self.line.duration:g} s, {len(self.jumps)} jump(s)"
-        columns = ("t (s)", *(f"J{joint + 1} (deg)" for joint in range(self.q.shape[1])))
-        return Sheet.of_table(found, columns, rows, len(rows), ("a row for each time of yours: .joints(t), in rad",))
-
     def joints(self, t: Reals) -> Reals:
         """Joint angles at times, by the closed form of the branch followed there.
 
@@ -513,8 +500,7 @@ def _jacobian_rate(robot: Robot, J: Reals, dq: Reals) -> Reals:
     turned = np.cumsum(moving[..., 3:], axis=1)
     beyond = moving[..., :3].sum(axis=1, keepdims=True) - np.cumsum(moving[..., :3], axis=1)
     rates = np.concatenate([np.cross(turned, v) + np.cross(w, beyond), np.cross(turned, w)], axis=2)
-    found: Reals = np.swapaxes(rates, 1, 2) @ coupling
-    return found
+    return np.swapaxes(rates, 1, 2) @ coupling
 
 
 JUMP_COST = 1e7

@@ -214,8 +214,7 @@ class LimitSide:
         """
         used = np.flatnonzero(self.factors)
         alone = len(used) == 1 and self.factors[used[0]] == 1
-        value: Reals = self.sign * (q[..., used[0]] if alone else q @ self.factors)
-        return value
+        return self.sign * (q[..., used[0]] if alone else q @ self.factors)
 
     def cause(self, most: float) -> Finding:
         """The finding for a motion that gets beyond this side.

@@ -445,8 +445,7 @@ def _trimmed(series: Reals) -> Reals:
 def _slope(times: Reals, series: Reals) -> Reals:
     if series.shape[1] < 2:
         return np.zeros_like(series)
-    found: Reals = chebyshev.chebder(series, axis=1) * (2 / np.diff(times))[:, None, None]
-    return found
+    return chebyshev.chebder(series, axis=1) * (2 / np.diff(times))[:, None, None]
 
 
 def evaluated(series: Reals, i: Integers, x: Reals) -> Reals:

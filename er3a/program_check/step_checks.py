@@ -253,8 +253,7 @@ class Judge:
         """The arc's point: T_world_tool (4, 4), m."""
         via = checked.motion.via
         if isinstance(via, PoseTarget) and checked.base is not None:
-            pose: Reals = checked.base @ via.pose
-            return pose
+            return checked.base @ via.pose
         if isinstance(via, JointTarget) and not np.isnan(via.joints).any():
             return forward(checked.arm, via.joints)
         return None

@@ -126,16 +126,14 @@ class Position:
         here = self._flange(flange)
         if here is None or tool.pose is None or base.pose is None:
             return None
-        found: Reals = np.linalg.inv(base.pose) @ here @ tool.pose
-        return found
+        return np.linalg.inv(base.pose) @ here @ tool.pose
 
     def _flange(self, flange: Flange | None) -> Reals | None:
         if self.joints is not None and flange is not None:
             return flange(self.joints)
         if self.pose is None or self.tool.pose is None or self.base.pose is None:
             return None
-        found: Reals = self.base.pose @ self.pose @ np.linalg.inv(self.tool.pose)
-        return found
+        return self.base.pose @ self.pose @ np.linalg.inv(self.tool.pose)
 
     def key(self) -> tuple[bytes, ...]:
         """A key that is equal for equal positions, by which states of a program are compared.

@@ -225,8 +225,7 @@ def _shared(sizes: Reals, duration: float | LegTimes) -> Reals:
     if isinstance(duration, LegTimes):
         return duration.times
     total = sizes.sum()
-    found: Reals = duration * (sizes / total if total > 0 else np.full(len(sizes), 1 / len(sizes)))
-    return found
+    return duration * (sizes / total if total > 0 else np.full(len(sizes), 1 / len(sizes)))
 
 
 def _row_times(timing: float | Times, sizes: Reals) -> Reals:

@@ -672,5 +672,4 @@ def by_length(ready: ReadyMotion, unit: str) -> float | None:
 def _moved(ready: ReadyMotion) -> Reals | None:
     if ready.joints is None or ready.joints_before is None:
         return None
-    found: Reals = np.abs(ready.joints - ready.joints_before)
-    return found
+    return np.abs(ready.joints - ready.joints_before)

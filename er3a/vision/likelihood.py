@@ -11,17 +11,15 @@ are independent at the board's middle, not at its origin, which is a corner: the
 variances (across and along the sight, tilt, turn) at a point of the board are estimated from the residuals, each
 divided by its redundancy [2]_, and the point with them.
 
-**Intervals** rest on the samples' own residuals, not on the covariance that weights them: each sample's six are one
-draw, independent of the other samples', with the correction of leverage and the degrees of freedom of [3]_. So they
-hold for errors of the arm, too, and for noise that is otherwise than stated.
+**Intervals** rest on the samples' own residuals, not on the covariance that weights them: those at one place of the
+flange are one draw, independent of other places' (:mod:`er3a.calibration.clustered`). So they hold for errors of the
+arm, too, and for noise that is otherwise than stated.
 
 References
 ----------
 .. [1] D. W. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", SIAM J. 11(2), 1963.
 .. [2] W. Foerstner, "Ein Verfahren zur Schaetzung von Varianz- und Kovarianzkomponenten", Allgemeine
    Vermessungs-Nachrichten 86, 1979.
-.. [3] R. M. Bell, D. F. McCaffrey, "Bias reduction in standard errors for linear regression with multi-stage
-   samples", Survey Methodology 28(2), 2002.
 """
 
 from __future__ import annotations
@@ -33,6 +31,7 @@ from functools import cached_property, partial
 import numpy as np
 import scipy
 
+from er3a.calibration.clustered import clustered_covariance
 from er3a.geometry.transforms import frame_along, inverse_right_jacobian, log_rotation, moved, skew, transposed
 from er3a.numerics.arrays import Reals
 from er3a.vision.calibration_set import CalibrationSet
@@ -121,11 +120,12 @@ class Refined:
     @cached_property
     def _intervals(self) -> tuple[Reals, Reals]:
         """Covariance and degrees of freedom, from the scatter of whole places."""
-        at = np.eye(self.samples.places.max() + 1)[self.samples.places]
-        variances, freedom = _clustered(self, at)
-        free = max(6 * at.shape[1] - len(self.inverse), 1)
+        places, numbers = self.samples.places, len(self.inverse)
+        J, groups = self.J.reshape(-1, numbers), np.repeat(places, 6)
+        covariance, freedom = clustered_covariance(J, self.whitened.ravel(), self.inverse, groups)
+        free = max(6 * (places.max() + 1) - numbers, 1)
         least = MIN_DEVIATION * np.diag(self.inverse)
-        variances = np.maximum(variances, least) * free / max(free - self.noise_numbers, 1)
+        variances = np.maximum(np.diag(covariance), least) * free / max(free - self.noise_numbers, 1)
         scale = np.sqrt(variances / np.diag(self.inverse))
         return self.inverse * np.outer(scale, scale), freedom
 
@@ -151,13 +151,13 @@ def half_width(covariance: Reals, freedom: Reals) -> Reals:
     Parameters
     ----------
     covariance : (p, p)
-    freedom : (p,), degrees of freedom; less than one counts as one
+    freedom : (p,), degrees of freedom
 
     Returns
     -------
     half : (p,), in the units of the numbers
     """
-    quantile = scipy.special.stdtrit(np.maximum(freedom, 1.0), (1 + CONFIDENCE) / 2)
+    quantile = scipy.special.stdtrit(freedom, (1 + CONFIDENCE) / 2)
     half: Reals = quantile * np.sqrt(np.diag(covariance))
     return half
 
@@ -300,22 +300,3 @@ class _Noise:
         shift = (weights @ fit.residual[:, :3, None]).ravel()
         middle = -np.linalg.solve(lever.T @ lever + np.eye(2) / MIDDLE**2, lever.T @ shift)
         return _Noise(self.B, self.places, deviations, np.append(middle, 0.0))
-
-
-def _clustered(fit: Refined, at: Reals) -> tuple[Reals, Reals]:
-    """Variances (p,) of the unknowns from the scatter of whole places, and their degrees of freedom (p,), after [3]_.
-
-    With H_n = J_n (J^T J)^-1 J_n^T, an unknown's error is the sum of g_n e_n over samples, where
-    g_n = (J^T J)^-1 J_n^T (1 - H_n)^-1/2 and e_n are the sample's residuals. ``at`` (N, C): the place of each sample; m
-    copies of a sample pull m times as much.
-    """
-    pulls = (at @ at.sum(axis=0))[:, None, None] * (fit.J @ fit.inverse @ fit.J.mT)
-    left, axes = np.linalg.eigh(np.eye(6) - pulls)
-    adjusted = axes / np.sqrt(np.maximum(left, MIN_FREE))[:, None] @ axes.mT
-    g = np.einsum("pq,nkq,nkl->pnl", fit.inverse, fit.J, adjusted)
-    variances = ((np.einsum("pnl,nl->pn", g, fit.whitened) @ at) ** 2).sum(axis=1)
-    own, pull = (g**2).sum(axis=2) @ at, np.einsum("pnl,nlq,nc->pcq", g, fit.J, at, optimize=True)
-    shared = np.einsum("pnq,qr,pnr->pn", pull, fit.inverse, pull)
-    both = np.einsum("pnq,pnr->pqr", pull, pull) @ fit.inverse
-    squares = (own * (own - 2 * shared)).sum(axis=1) + np.einsum("pqr,prq->p", both, both)
-    return variances, (own - shared).sum(axis=1) ** 2 / squares

@@ -12,6 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from er3a.calibration.parameters import corrected
+from er3a.comparison.entries import entries_in
 from er3a.geometry.transforms import skew, step_between
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -76,17 +78,11 @@ def table_covariance(robot: Robot, q: Reals, accuracy: ArmAccuracy) -> Reals:
     """
     at = forward(robot, q)
     out = np.zeros((*at.shape[:-2], 6, 6))
-    for name, deviation in (
-        ("a", accuracy.length_deviation),
-        ("d", accuracy.length_deviation),
-        ("alpha", accuracy.angle_deviation),
-        ("offset", accuracy.angle_deviation),
-    ):
-        for row in range(robot.rows if deviation else 0):
-            entries = np.array(getattr(robot, name))
-            entries[row] += TABLE_STEP
-            step = step_between(at, forward(robot.replace(**{name: entries}), q)) / TABLE_STEP
-            out += deviation**2 * step[..., :, None] * step[..., None, :]
+    for entry in entries_in(("a", "d", "alpha", "offset"), robot.rows):
+        deviation = accuracy.length_deviation if entry.unit == "mm" else accuracy.angle_deviation
+        moved = corrected(robot, (entry,), np.array([TABLE_STEP]))
+        step = deviation * step_between(at, forward(moved, q)) / TABLE_STEP
+        out += step[..., :, None] * step[..., None, :]
     return out
 
 

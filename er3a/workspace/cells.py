@@ -107,8 +107,7 @@ def ring_volumes(cells: Reals, bar: float = 0.0) -> Reals:
     """
     if bar > 0:
         return np.asarray((cells[:, 1] - cells[:, 0]) * (cells[:, 3] - cells[:, 2]) * bar)
-    volumes: Reals = np.pi * (cells[:, 1] ** 2 - cells[:, 0] ** 2) * (cells[:, 3] - cells[:, 2])
-    return volumes
+    return np.pi * (cells[:, 1] ** 2 - cells[:, 0] ** 2) * (cells[:, 3] - cells[:, 2])
 
 
 def in_space(rho: Reals, azimuth: Reals, z: Reals, bar: float = 0.0) -> Reals:

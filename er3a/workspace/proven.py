@@ -140,8 +140,7 @@ class Cavity:
     @property
     def volumes(self) -> Reals:
         """Volume of each arc's piece of ring, (n,), m^3."""
-        volumes: Reals = ring_volumes(self.cells, self.bar) * (self.arcs[:, 1] - self.arcs[:, 0]) / TURN
-        return volumes
+        return ring_volumes(self.cells, self.bar) * (self.arcs[:, 1] - self.arcs[:, 0]) / TURN
 
     @property
     def lower(self) -> float:

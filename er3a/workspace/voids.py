@@ -44,8 +44,7 @@ class Blocks:
             across = np.diff(self.rho)[:, None] * np.diff(self.z)
             return np.asarray(across[:, :, None] * np.diff(self.azimuth) * self.bar / TURN)
         section = (self.rho[1:] ** 2 - self.rho[:-1] ** 2)[:, None] * np.diff(self.z) / 2
-        volumes: Reals = section[:, :, None] * np.diff(self.azimuth)
-        return volumes
+        return section[:, :, None] * np.diff(self.azimuth)
 
     def points(self) -> Reals:
         """Middles of the blocks.

@@ -16,8 +16,7 @@ import er3a
 from er3a.calibration import calibrate as calibration
 from er3a.calibration.fit import jacobian
 from er3a.calibration.observations import Measurement, observed
-from er3a.calibration.outcomes import CalibrationError
-from er3a.calibration.parameters import parallel_pairs, parameters_of, placements_of
+from er3a.calibration.parameters import CalibrationError, parallel_pairs, parameters_of, placements_of
 from er3a.errors import InputError
 from er3a.files.by_name import COLUMNS, load_measurements
 from er3a.files.robot_library import load_robot

@@ -15,10 +15,10 @@ from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 import er3a
-from er3a.calibration.fit import Fit, covariance_by_poses
+from er3a.calibration.clustered import clustered_covariance
+from er3a.calibration.fit import Fit
 from er3a.calibration.observations import Measurement, PointObservations, spread
-from er3a.calibration.outcomes import CalibrationError
-from er3a.calibration.parameters import coupled, settles
+from er3a.calibration.parameters import CalibrationError, coupled, settles
 from er3a.calibration.terms import JointErrors, JointTerm, candidates, starting_table
 from er3a.errors import Er3aError, InputError
 from er3a.files.by_name import load_measurements
@@ -606,7 +606,7 @@ def test_intervals_rest_on_as_many_degrees_of_freedom_as_two_means_have():
     off = rest - J @ np.linalg.lstsq(J, rest, rcond=None)[0]
     every = np.arange(first + second)
     found = Fit((), (), np.zeros(2), np.zeros(0), rest, off, J, off, np.ones(len(every)), every)
-    covariance, freedom = covariance_by_poses(found, every)
+    covariance, freedom = clustered_covariance(J, off, found.covariance, every)
     variances = rest[:first].var(ddof=1) / first, rest[first:].var(ddof=1) / second
     assert covariance[1, 1] == pytest.approx(sum(variances))
     shares = 1 / (first**2 * (first - 1)), 1 / (second**2 * (second - 1))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from er3a.diagnosis import conclusions, faults
+from er3a.diagnosis import faults
 from er3a.diagnosis.faults import repairs_of, rounded, wrong_number
 from er3a.diagnosis.fitting import free_numbers
 from er3a.files.reference_sets import load_references
@@ -88,9 +88,3 @@ def test_fitted_numbers_to_four_digits_are_the_same_fault():
         fact("wrong_length", joint=1, column="a", given_mm=50.0, fits_mm=70.06)
     )
     assert rounded(fact("wrong_scale", factor=np.float64(0.9523809))) == fact("wrong_scale", factor=0.952381)
-
-
-@pytest.mark.parametrize("room", [conclusions, faults])
-def test_codes_are_different(room):
-    codes = [kind.code for kind in vars(room).values() if isinstance(kind, type) and hasattr(kind, "code")]
-    assert len(set(codes)) == len(codes)

@@ -209,7 +209,7 @@ def calibrate(
     measuring), or positions held back contradict the result. It is written all the same.
     """
     from er3a.calibration.observations import check_poses
-    from er3a.calibration.outcomes import CalibrationError
+    from er3a.calibration.parameters import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.robot_library import load_robot
     from er3a.pipeline.messages.calibration import calibration_record, held_back_line, kept_lines, lines_of

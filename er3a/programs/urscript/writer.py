@@ -123,8 +123,7 @@ class UrScriptWriter(Writer):
         base = ready.motion.base.pose
         if base is None or np.array_equal(base, np.eye(4)):
             return pose
-        found: Reals = base @ pose
-        return found
+        return base @ pose
 
     def _tool(self, ready: ReadyMotion) -> None:
         tool = ready.motion.tool

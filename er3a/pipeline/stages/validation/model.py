@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, Self
 
-from er3a.diagnosis.conclusions import RankedHypothesis
+from er3a.diagnosis.diagnose import RankedHypothesis
 from er3a.files.robot_library import robot_of
 from er3a.finding import Finding, is_one
 from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
