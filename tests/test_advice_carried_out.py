@@ -31,6 +31,7 @@ AT_PLACES = "test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lat
 MEASURED = "test_the_proposed_measurement_contradicts_another_arm"
 CARRIED_OUT = {
     **dict.fromkeys(REMEDIES, OF_PROGRAMS),
+    "later_out_of_reach": "test_a_loop_that_drifts_is_mended_as_advised",
     **{f"singular.{kind}": OF_PROGRAMS for kind in ("wrist", "elbow", "shoulder")},
     **{f"not_followed.{reason}": OF_PROGRAMS for reason in NOT_FOLLOWED},
     "remedy.zone_too_large": OF_PROGRAMS,
@@ -78,7 +79,7 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("centre_outside", "unlikely_density", "unlikely_inertia", "unexplained_residuals"),
     *("no_correction_fits", "contradiction", "advice.no_part"),
     *("read_limit", "time_joint"),
-    *("payload", "why.guessed"),
+    *("payload", "why.guessed", "shapes_assumed"),
     *("validation.off", "validation.no_reference", "validation.defined_otherwise", "far_from_table"),
 }
 NO_ADVICE = {"below_limit", "trajectory.paths"}

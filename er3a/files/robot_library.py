@@ -279,7 +279,7 @@ def robot_path(name_or_path: str | Path) -> Path:
         problem = f"'{text}' is a known arm; a study needs its file"
         raise InputError(None, None, problem, f"Write it: er3a arms {text} --output data/robots/{text}.yaml")
     if path is None:
-        alike = [name for name in known_arms() if text.lower() in name]
+        alike = [name for name in known_arms() if text and text.lower() in name]
         known = ", ".join(alike or names("data/robots", "*.yaml"))
         remedy = f"Known: {known}; those of er3a arms; or give a path ending in .yaml"
         raise InputError(None, None, f"there is no robot '{text}'", remedy)

@@ -214,9 +214,16 @@ def test_loading_by_path_and_by_name_agree():
     np.testing.assert_array_equal(by_path.d, load_robot("er3_600").d)
 
 
-@pytest.mark.parametrize("name", ["er3_60", "", "../robots/er3_600", "er3_600\0"])
-def test_an_unknown_name_lists_the_known_ones(name):
-    with pytest.raises(InputError, match=r"there is no robot .* Known: er3_600, er3a_c60, er3a_c60_article"):
+@pytest.mark.parametrize(
+    ("name", "known"),
+    [
+        ("er3_60", "er3_600;"),
+        ("IRB46", "irb4600_20_250, irb4600_40_255, irb4600_60_205;"),
+        *((name, "er3_600, er3a_c60, er3a_c60_article") for name in ("", "../robots/er3_600", "er3_600\0")),
+    ],
+)
+def test_an_unknown_name_lists_the_known_ones(name, known):
+    with pytest.raises(InputError, match=f"there is no robot .* Known: {known}"):
         load_robot(name)
 
 

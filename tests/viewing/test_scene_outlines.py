@@ -28,4 +28,5 @@ def sides(outline: np.ndarray) -> list[float]:
 def test_outlines_seen_from_above_and_from_the_side(solid, above, beside):
     for shown, expected in (([0, 1], above), ([0, 2], beside)):
         (outline,) = outlines(solid, shown)
-        assert sides(outline) == pytest.approx(expected, abs=1e-12)
+        widest = 5e-5 if isinstance(solid, Cylinder) else 1e-12  # m, of a prism around a cylinder
+        assert sides(outline) == pytest.approx(expected, abs=widest)
