@@ -182,7 +182,7 @@ def test_a_robot_is_refused_where_no_source_could_print_it(arm, changes, message
 
 
 NO_POSE = {
-    "not orthonormal": (lambda T: T @ np.diag([1.001, 1, 1, 1]), "not orthonormal"),
+    "not orthonormal": (lambda T: T @ np.diag([1.002, 1, 1, 1]), "not orthonormal"),
     "left-handed": (lambda T: T @ np.diag([-1.0, 1, 1, 1]), "left-handed"),
     "shape": (lambda T: T[:3], "has shape"),
     "NaN": (lambda T: np.where(np.arange(4) == 3, np.nan, T), "NaN or infinity"),
@@ -198,6 +198,16 @@ def test_a_matrix_that_is_no_pose_is_refused(arm, pose, name, kind):
     make, message = NO_POSE[kind]
     batch = [make(pose)] if name == "inverse_batch" and kind not in ("text", "none") else make(pose)
     assert message in refusal(lambda: getattr(er3a, name)(arm, batch))
+
+
+def test_a_pose_with_three_decimals_is_taken_and_said_to_be_rounded(arm, pose):
+    with pytest.warns(er3a.InputWarning, match=r"rounded: the nearest rotation is taken, 0\.000\d off"):
+        found = er3a.inverse(arm, np.round(pose, 3))
+    reached = er3a.forward(arm, found.q)
+    np.testing.assert_allclose(
+        reached[:, :3, :3] @ reached[:, :3, :3].swapaxes(1, 2), [np.eye(3)] * len(reached), atol=1e-9
+    )
+    np.testing.assert_allclose(reached, np.tile(np.round(pose, 3), (len(reached), 1, 1)), atol=1e-3)
 
 
 def test_one_bad_pose_of_a_large_batch_is_named(arm, pose):

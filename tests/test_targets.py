@@ -108,7 +108,7 @@ BAD = {
     "micrometres": ([TURNED | {"xyz_mm": [500_000, 0, 0]}], "targets[0].xyz_mm", "more than 100 m"),
     "many turns": ([TURNED | {"q_ref_deg": [0, 0, 0, 0, 0, 100001]}], "targets[0].q_ref_deg", "ten turns"),
     "long quaternion": ([PLACE | {"quaternion_wxyz": [1, 1, 0, 0]}], "targets[0].quaternion_wxyz", "length is 1.41"),
-    "short quaternion": ([PLACE | {"quaternion_wxyz": [0.999998, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is"),
+    "short quaternion": ([PLACE | {"quaternion_wxyz": [0.998, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is"),
     "zero quaternion": ([PLACE | {"quaternion_wxyz": [0, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is 0"),
     "skew matrix": ([PLACE | {"matrix": [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}], "targets[0].matrix", "not a rotation"),
     "mirror": ([PLACE | {"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}], "targets[0].matrix", "left-handed"),

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.calibration.clustered import clustered_covariance
 from er3a.calibration.cross_validation import (
     ChosenTerms,
@@ -332,6 +332,23 @@ class Calibration(ByValue, Displayed):
     tried: tuple[TriedTerm, ...] = ()
     tried_for_file: tuple[TriedTerm, ...] = ()
     beyond: Beyond | None = None
+
+    def sheet(self) -> Sheet:
+        """What the notebook shows: a row for each estimated entry, in mm and deg, with its 95 % interval.
+
+        Returns
+        -------
+        sheet : with the conclusion, and why other entries were held
+        """
+        rows = ((each.name, each.nominal, each.correction, each.half_width, each.unit) for each in self.estimates)
+        rms = f"rms {shortly(self.rms_before_mm)} -> {shortly(self.rms_after_mm)} mm"
+        return Sheet.of_table(
+            f"Calibration of {self.robot.name} with {self.coordinates} coordinates at {self.poses} poses: {rms}",
+            ("entry", "nominal", "correction", "+-95 %", "unit"),
+            rows,
+            len(self.estimates),
+            (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
+        )
 
     @property
     def fits(self) -> bool:

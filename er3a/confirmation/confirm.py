@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.comparison.entries import Entry
 from er3a.confirmation.fit import Fitter, Place, Solution
 from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, parts_of, search
@@ -135,6 +135,17 @@ class Confirmation(ByValue, Displayed):
     taken_up: tuple[str, ...]
     notes: tuple[tuple[str, str], ...]
     oriented: bool
+
+    def sheet(self) -> Sheet:
+        """Verdict and what is left at each pose, for printing.
+
+        Returns
+        -------
+        sheet : one row for each pose
+        """
+        columns = ("line", "mm before", "mm", "deg")
+        rows = zip(self.lines.tolist(), self.before_mm, self.left_mm, self.left_deg)
+        return Sheet.of_table(f"Confirmation: {self.verdict}", columns, rows, len(self.lines), self.layers)
 
     def __bool__(self) -> bool:
         raise TypeError("a confirmation is neither true nor false; read its verdict")

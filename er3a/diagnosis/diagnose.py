@@ -63,6 +63,16 @@ class Hypothesis(ByValue, Displayed, RankedHypothesis):
 
     corrected: Robot
 
+    def sheet(self) -> Sheet:
+        """What the notebook shows: the faults, and the greatest difference before and after, in the unit named.
+
+        Returns
+        -------
+        sheet : one line
+        """
+        remains = f"{shortly(self.residual_before)} -> {shortly(self.residual_after)} {self.unit}"
+        return Sheet(f"Hypothesis: {shortly(self.faults)}; greatest difference {remains}")
+
 
 class Diagnosis(list[Hypothesis], Displayed):
     """What references say about a table: hypotheses, best first.

@@ -15,7 +15,14 @@ import numpy as np
 import scipy
 
 from er3a.errors import InputError
-from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, exp_rotation, nearest_rotations, posed, transform
+from er3a.geometry.transforms import (
+    ROUNDED_TOLERANCE,
+    exp_rotation,
+    nearest_rotations,
+    posed,
+    transform,
+    warn_of_rounding,
+)
 from er3a.numerics.arrays import Reals
 
 POSITION = ("x_mm", "y_mm", "z_mm")
@@ -69,7 +76,7 @@ class NoRotationError(ValueError):
         self.row, self.problem, self.remedy = row, problem, remedy
 
 
-def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) -> Reals:
+def rotations(form: str, values: Any, tolerance: float = ROUNDED_TOLERANCE) -> Reals:
     """Rotation matrices of orientations in one form.
 
     Parameters
@@ -98,6 +105,8 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
         length = np.hypot.reduce(values, axis=1)
         wrong = ~(np.abs(length - 1) <= tolerance)
         _refuse(wrong, "the quaternion's length is {:.9g}, not 1", length, "Divide w, x, y and z by it")
+        if tolerance == ROUNDED_TOLERANCE:
+            warn_of_rounding("a quaternion", np.abs(length - 1).max(initial=0.0))
         return np.asarray(scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix())
     R = values.reshape(-1, 3, 3)
     R = R.mT if form == "matrix_of_columns" else R
@@ -107,7 +116,10 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
     _refuse(~(off <= tolerance), "the matrix is not a rotation: R R^T differs from 1 by {:.3g}", off, remedy)
     mirrored = np.linalg.det(R)
     _refuse(mirrored < 0, "the matrix is left-handed (its determinant is {:.0f})", mirrored, "Change one axis's sign")
-    return nearest_rotations(R)
+    nearest = nearest_rotations(R)
+    if tolerance == ROUNDED_TOLERANCE:
+        warn_of_rounding("a matrix", np.abs(nearest - R).max(initial=0.0))
+    return nearest
 
 
 def poses_of(
@@ -115,7 +127,7 @@ def poses_of(
     rows: Sequence[Mapping[str, Any]],
     form: str,
     prefix: str = "",
-    tolerance: float = ORTHONORMAL_TOLERANCE,
+    tolerance: float = ROUNDED_TOLERANCE,
 ) -> Reals:
     """The poses that rows of a table give.
 

@@ -9,15 +9,18 @@ References
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import scipy
 
-from er3a.errors import PoseError, ShapeError
+from er3a.errors import InputWarning, PoseError, ShapeError
 from er3a.numerics.arrays import Reals, as_floats, for_kernel
 from er3a.numerics.jit import kernel
 
 ORTHONORMAL_TOLERANCE = 1e-6  # of the product of two rows: poses written with seven decimals pass
 BOTTOM_ROW_TOLERANCE = 1e-12  # products of transforms leave the bottom row exact but for rounding
+ROUNDED_TOLERANCE = 1.75e-3  # the same of what people type with three decimals
 MAX_DISTANCE_M = 100.0  # from the origin: no arm reaches so far, so a longer position was meant in mm
 
 
@@ -193,6 +196,17 @@ def nearest_rotations(M: Reals) -> Reals:
     U[..., -1] *= np.sign(np.linalg.det(U @ Vt))[..., None]
     R: Reals = U @ Vt
     return R
+
+
+def warn_of_rounding(what: str, off: float) -> None:
+    """Warn (``er3a.InputWarning``) of a rotation that was typed with few decimals: the nearest one is taken.
+
+    Parameters
+    ----------
+    off : by which its elements, or a quaternion's length, are off; up to ``ORTHONORMAL_TOLERANCE`` nothing is said
+    """
+    if off > ORTHONORMAL_TOLERANCE:
+        warnings.warn(f"{what} is rounded: the nearest rotation is taken, {off:.1g} off", InputWarning, stacklevel=5)
 
 
 SMALL_TURN = 1e-4  # rad; below, series replace quotients of vanishing numbers
@@ -409,6 +423,27 @@ def check_poses(T: Reals, argument: str = "T") -> Reals:
             where = f"{argument}[{', '.join(map(str, index))}]" if index else argument
             raise PoseError(f"{where} {fault}")
     return T
+
+
+def typed_pose(T: Reals) -> Reals:
+    """A pose whose rotation may be typed with three decimals; of all else :func:`check_poses`.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+
+    Returns
+    -------
+    T : (4, 4), with the nearest rotation, and a warning how far it is off
+    """
+    T = as_floats(T, "T")
+    if T.shape == (4, 4) and not _all_rigid(for_kernel(T)[None]):
+        R = T[:3, :3]
+        if np.abs(R @ R.T - np.eye(3)).max() <= ROUNDED_TOLERANCE and np.linalg.det(R) > 0:
+            T = T.copy()
+            T[:3, :3] = nearest_rotations(R)
+            warn_of_rounding("T's rotation", np.abs(T[:3, :3] - R).max())
+    return check_poses(T)
 
 
 def _fault_of(T: Reals) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
 from er3a.finding import Finding, fact, is_one
-from er3a.geometry.transforms import check_poses
+from er3a.geometry.transforms import typed_pose
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
 from er3a.kinematics.by_class import CONFIRMS, confirms, meets_poses, misses, task_mask
@@ -64,7 +64,7 @@ def inverse(
 
     Parameters
     ----------
-    T : (4, 4), T_base_tool, m
+    T : (4, 4), T_base_tool, m; of a rotation with three decimals the nearest is taken, and a warning says how far it is
     q_ref : (n,), rad or m, reference for the choice of members of self-motions and of whole turns: in each branch the
         nearest turn comes first. None means zeros.
     redundancy : (k,), values of the redundancy parameters (``parameters_of``): an arm angle in rad, or a joint's value;
@@ -83,7 +83,7 @@ def inverse(
     """
     if (at_once := _at_once(robot, T, q_ref)) is not None:
         return at_once
-    T = check_poses(T)
+    T = typed_pose(T)
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
     q_ref = checked_reference(robot, q_ref)

@@ -22,14 +22,14 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
 import scipy
 
-from er3a.by_value import Displayed
+from er3a.by_value import Displayed, Sheet
 from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.kinematics.chain import arm_length, axes_at_zero_theta, constant_links, row_values
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
@@ -63,6 +63,17 @@ class Conditioning(Displayed):
     manipulability: Reals
     condition_number: Reals
     smallest_singular_value: Reals
+
+    def sheet(self) -> Sheet:
+        """The three measures at each joint vector, for printing.
+
+        Returns
+        -------
+        sheet : one row for each
+        """
+        measures = [np.ravel(getattr(self, each.name)) for each in fields(self)]
+        columns, count = tuple(each.name.replace("_", " ") for each in fields(self)), len(measures[0])
+        return Sheet.of_table(f"Conditioning at {count} joint vector(s)", columns, zip(*measures), count)
 
 
 @dataclass(frozen=True, eq=False)

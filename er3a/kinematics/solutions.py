@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.errors import with_extra
 from er3a.finding import Finding, fact, is_one
+from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
@@ -315,6 +316,16 @@ class Target(ByValue, Displayed):
     q_ref_deg: tuple[float, ...] = (0.0,) * 6
     expect: TargetOutcome | None = None
     joints_before: Reals | None = None
+
+    def sheet(self) -> Sheet:
+        """A line for printing: name, position (mm) and roll, pitch, yaw (deg).
+
+        Returns
+        -------
+        sheet : without rows
+        """
+        xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * self.T[:3, 3], np.degrees(rpy_of(self.T))))
+        return Sheet(f"Target {self.name}: xyz_mm {xyz}; rpy_deg {rpy}")
 
     @property
     def q_ref(self) -> Reals:

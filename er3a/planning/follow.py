@@ -34,7 +34,7 @@ from itertools import product
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.errors import PoseError
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import arm_length
@@ -329,6 +329,30 @@ class Followed(ByValue, Displayed):
     slot: Integers
     start_turn: Reals
     jumps: tuple[BranchJump, ...]
+
+    @property
+    def out_of_reach(self) -> tuple[tuple[float, float], ...]:
+        """Between which times (s) no branch reaches the line, by the first and last row without joints."""
+        spans = runs(np.asarray(np.isnan(self.q).any(axis=1), np.bool_))
+        return tuple((float(self.t[first]), float(self.t[after - 1])) for first, after in spans)
+
+    def sheet(self) -> Sheet:
+        """What the notebook shows: times in s, and joints in degrees; and where the line leaves the reach.
+
+        Returns
+        -------
+        sheet : a row for each grid point
+        """
+        rows = np.column_stack([self.t, np.degrees(self.q)])
+        found = f"Joints along a line: {len(self.t)} rows over {self.line.duration:g} s, {len(self.jumps)} jump(s)"
+        columns = ("t (s)", *(f"J{joint + 1} (deg)" for joint in range(self.q.shape[1])))
+        ways = 1000 * self.line.length * np.interp([first for first, _ in self.out_of_reach], self.t, self.progress)
+        facts = [
+            f"out of reach from {first:.4g} to {last:.4g} s, after {way:.1f} mm"
+            for (first, last), way in zip(self.out_of_reach, ways)
+        ]
+        told = (*facts, "a row for each time of yours: .joints(t), in rad")
+        return Sheet.of_table(found, columns, rows, len(rows), told)
 
     def joints(self, t: Reals) -> Reals:
         """Joint angles at times, by the closed form of the branch followed there.

@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 from numpy.polynomial import chebyshev
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.numerics.arrays import Integers, Reals
 from er3a.planning.profiles import Rates, pieces_at
 
@@ -144,8 +144,8 @@ class Pieces:
         return most, at
 
 
-@dataclass(frozen=True, eq=False)
-class PiecewiseMotion(ByValue):
+@dataclass(frozen=True, eq=False, repr=False)
+class PiecewiseMotion(ByValue, Displayed):
     """A motion of n joints.
 
     A piece may be a gap: its rates are NaN where they are not known, its angles too where the arm does not go through.
@@ -160,6 +160,18 @@ class PiecewiseMotion(ByValue):
     angle: Reals
     velocity: Reals
     acceleration: Reals
+
+    def sheet(self) -> Sheet:
+        """What the notebook shows: joints where pieces begin and end.
+
+        Returns
+        -------
+        sheet : a row for each of ``times``
+        """
+        rows = np.column_stack([self.times, self.joints(self.times)])
+        columns = ("t (s)", *(f"J{joint} (rad or m)" for joint in range(1, rows.shape[1])))
+        heading = f"Motion in {len(self.times) - 1} piece(s) over {self.duration:g} s"
+        return Sheet.of_table(heading, columns, rows, len(rows), ("joints at times of yours: .joints(t)",))
 
     @property
     def duration(self) -> float:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import check_poses, inverted, step_between
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -56,6 +56,17 @@ class CalibrationSet(ByValue, Displayed):
     touch_deviation: float = 0.0
     shared: Reals | None = None
     of_joints: bool = False
+
+    def sheet(self) -> Sheet:
+        """What the notebook shows: where flange and board were, in mm.
+
+        Returns
+        -------
+        sheet : a row for each sample
+        """
+        rows = zip(self.names, *(1000 * self.flange[:, :3, 3].T), *(1000 * self.target[:, :3, 3].T))
+        columns = ("sample", *(f"{part}_{c}_mm" for part in ("flange", "board") for c in "xyz"))
+        return Sheet.of_table(f"{len(self)} samples, {self.setup.replace('_', ' ')}", columns, rows, len(self))
 
     def __post_init__(self) -> None:
         for name in ("flange", "target"):

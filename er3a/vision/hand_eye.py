@@ -25,7 +25,7 @@ import numpy as np
 import scipy
 from scipy.spatial.transform import Rotation
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import (
     inverted,
@@ -333,6 +333,7 @@ MIN_SPREAD = np.radians(1.0)  # of the rotation axes, without which a shift alon
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
+MAX_FACTS = 10  # findings that a notebook shows
 
 
 @dataclass(frozen=True, eq=False)
@@ -398,6 +399,26 @@ class HandEye(ByValue, Displayed):
     warnings: tuple[Finding, ...]
     touch: TouchCheck | None
     mismatch: Reals
+
+    def sheet(self) -> Sheet:
+        """What the notebook shows: the twelve numbers in mm and deg, with half their 95 % intervals.
+
+        Returns
+        -------
+        sheet : a row for each axis of both poses, and the first findings
+        """
+        in_hand = self.samples.setup == "eye_in_hand"
+        poses = ("T_flange_camera", "T_base_board") if in_hand else ("T_base_camera", "T_flange_board")
+        rows = [
+            (name, axis, 1000 * T[k, 3], 1000 * half[k], np.degrees(rpy_of(T)[k]), np.degrees(half[3 + k]))
+            for name, T, half in zip(poses, (self.X, self.Y), self.half_width.reshape(2, 6))
+            for k, axis in enumerate("xyz")
+        ]
+        columns = ("pose", "axis", "mm", "half_width_mm", "rpy_deg", "half_width_deg")
+        found = [*self.suspects, *self.warnings]
+        facts = tuple(shortly(each) for each in found[:MAX_FACTS])
+        heading = f"Hand-eye calibration, {int(self.used.sum())} of {len(self.samples)} samples used"
+        return Sheet.of_table(heading, columns, rows, len(rows), facts)
 
     @property
     def copies(self) -> tuple[str, ...]:

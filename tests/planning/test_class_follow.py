@@ -120,6 +120,20 @@ def test_what_can_not_be_followed_is_told_with_the_time():
 
 
 @pytest.mark.usefixtures("uncompiled")
+@pytest.mark.usefixtures("uncompiled")
+def test_a_line_beyond_the_reach_says_when_it_leaves_it():
+    robot = er3a.load_robot("er3a_c60")
+    T = forward(robot, np.radians([0, -20, 20, 0, -40, 0]))
+    away = T.copy()
+    away[0, 3] += 0.6
+    followed = er3a.follow(robot, line(T, away, 2.0), np.linspace(0, 2, 50))
+    ((first, last),) = followed.out_of_reach
+    assert last == 2.0
+    assert np.isfinite(followed.q[followed.t < first]).all()
+    assert np.isnan(followed.q[followed.t >= first]).all()
+    assert f"out of reach from {first:.4g} to 2 s, after " in str(followed)
+
+
 def test_an_arm_of_no_class_that_follows_is_refused():
     T = np.eye(4)
     panda = ([0, 0, 0.0825, -0.0825, 0, 0.088, 0], [-H, H, H, -H, H, H, 0], [0.333, 0, 0.316, 0, 0.384, 0, 0.107])
