@@ -11,7 +11,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.convex import RIM
+from er3a.collision.convex import TOO_WIDE
 from er3a.collision.scene import Mesh, Scene
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
@@ -207,7 +207,7 @@ def test_the_least_distance_is_python_s(page, name, scene, random):
     least, _ = bodies.min_distance(q)
     assert not any(one["deep"] for one in found)
     distance = np.array([one["distance"] for one in found])
-    rim = bodies.layout.disc.max() * (1 / np.cos(np.pi / RIM) - 1)  # Python's cylinders overlap as prisms around them
+    rim = 2 * TOO_WIDE  # Python's cylinders overlap as prisms around them
     assert np.abs(distance - least)[least > 0].max() < 1e-8
     assert (distance - least).min() > -1e-6
     assert (distance - least).max() < rim + 1e-6
