@@ -30,7 +30,6 @@ from er3a.pipeline.viewing.page import (
     render_stage,
 )
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, MUTED
-from er3a.robots.robot import Robot
 
 MAX_IMAGES = 9
 WIDEST_PX = 480
@@ -138,7 +137,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         study,
         stored,
         output,
-        _answer(robot, results),
+        _answer(results),
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
@@ -159,13 +158,13 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     )
 
 
-def _answer(robot: Robot, results: model.VisionResults) -> Answer:
+def _answer(results: model.VisionResults) -> Answer:
     """How many objects can be grasped, what that leaves open, and how well the camera's place is known."""
     summary = results.summary
     grasped = [each for each in summary.objects if each.grasp]
     caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
     due, found = len(summary.objects) - len(caught), summary.calibration
-    headline = tr("{count} of {due} reachable.", count=len(grasped), due=due)
+    headline = tr("{count} of {due} can be grasped.", count=len(grasped), due=due)
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
     rest = all_caught(len(caught))
@@ -173,24 +172,21 @@ def _answer(robot: Robot, results: model.VisionResults) -> Answer:
         headline, rest = joined([headline, rest], " "), ""
     keys = []
     if off := [each.error_mm.together for each in grasped if each.error_mm]:
-        keys = [(with_unit(fixed(max(off), 1), "mm"), tr("error at the grasp, 95 %"))]
+        made = tr("error at the grasp, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
+        keys = [(with_unit(fixed(max(off), 1), "mm"), made)]
     elif found:
         half = max(found.hand_eye.half_width_mm)
         keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [
-        Group(tr("Not reachable"), [row for row in shown if row.mark == "fail"]),
-        Group(tr("Reachable"), [row for row in shown if row.mark == "pass"]),
+        Group(tr("Can't be grasped"), [row for row in shown if row.mark == "fail"]),
+        Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
     if found and (found.suspects or found.warnings):
         rows = [ListRow("caution", each.sample, _why_left_out(each), "#samples") for each in found.suspects]
         rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
-    wrist = robot.masses.wrist
-    unrated = bool(summary.objects) and (wrist is None or not np.isfinite(wrist.payload))
-    below = [tr("Payload unknown.")] if unrated else []
-    below += [tr("The camera is simulated.")] if found and found.simulated else []
-    return Answer(headline, rest, joined(below, " "), keys, groups)
+    return Answer(headline, rest, "", keys, groups)
 
 
 def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
@@ -198,7 +194,7 @@ def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
     if each.grasp is None:
         return ListRow("fail", each.name, refusal_text(each), f"#{each.name}", moment)
     sure = each.grasp.probability
-    note = tr("success: {percent} %", percent=fixed(100 * sure, 1))
+    note = tr("{percent} % succeed", percent=fixed(100 * sure, 1))
     return ListRow("pass", each.name, note, f"#{each.name}", moment, 1.0, [Part(sure, 1.0, "rest")])
 
 
