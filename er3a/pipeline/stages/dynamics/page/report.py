@@ -19,7 +19,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import FELT, hanging, held, holding_name, motions, within
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark
 from er3a.pipeline.viewing.figures import axis_label, bars, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS
@@ -86,8 +86,8 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
 
 MAX_USES = 12
 NONE = "–"
-LEAST = 0.01  # N m or N, below which no motor feels anything
-SEEN = 0.02  # of a bar, below which it is a speck
+TENS = 10.0  # from here on a figure has no decimals
+SEEN = 0.02  # of the longest bar, below which one is a speck
 WITHOUT = words({"load": "load", "friction": "friction", "rotor_inertias": "rotors", "link_masses": "some masses"})
 
 
@@ -166,27 +166,33 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
-    rows = []
+    loads = [load for path in summary.paths if path.counts for load in path.joints]
+    rows, idle = [], []
     for motor in order:
-        if limited or motor.peak >= LEAST:
-            moment = _moment_of(results, motor)
-            name = joined([f"J{motor.joint}", moment[0]], ", ")
-            rows.append(_row(motor, motor.peak, name, moment, longest, motor.peak_limit))
-    if idle := [motor.joint for motor in order[len(rows) :]]:
-        loads = [load for path in summary.paths if path.counts for load in path.joints if load.joint in idle]
-        most = at_most(max(load.peak + load.tolerance for load in loads), 1)
-        names = joined((f"J{joint}" for joint in idle), ", ")
-        rows.append(ListRow("none", names, with_unit(f"≤ {most}", order[-1].unit), "#motors"))
+        if not limited and motor.unit == worst.unit and motor.peak < SEEN * longest:
+            idle.append(motor.joint)
+            continue
+        moment = _moment_of(results, motor)
+        name = joined([f"J{motor.joint}", moment[0]], ", ")
+        off = max(load.tolerance for load in loads if load.joint == motor.joint and load.peak == motor.peak)
+        rows.append(_row(motor, (motor.peak, off), name, moment, longest, motor.peak_limit))
+    if idle:
+        most = at_most(max(load.peak + load.tolerance for load in loads if load.joint in idle), 1)
+        names = joined((f"J{joint}" for joint in sorted(idle)), ", ")
+        rows.append(ListRow("none", names, with_unit(f"≤ {most}", worst.unit), "#motors"))
     still = [
-        _row(motor, motor.holding, name, (name, 0.0), longest)
+        _row(
+            motor, (motor.holding, held.tolerance), holding_name(motor.joint), (holding_name(motor.joint), 0.0), longest
+        )
         for motor in order
-        if motor.holding >= LEAST and (name := holding_name(motor.joint))
+        for held in summary.holding
+        if held.joint == motor.joint and motor.holding >= SEEN * longest
     ]
     left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
     return Answer(
         headline,
         "",
-        tr("Without {parts}.", parts=joined(left, ", ")) if left else "",
+        tr("At least: without {parts}.", parts=joined(left, ", ")) if left else "",
         [
             (moving, tr("J{joint} moving", joint=worst.joint)),
             (holding, tr("J{joint} holding", joint=worst.joint)),
@@ -210,19 +216,20 @@ def _mark(motor: model.MotorNeed) -> Mark:
 
 
 def _row(
-    motor: model.MotorNeed, value: float, name: str, moment: tuple[str, float], most: float, limit: float | None = None
+    motor: model.MotorNeed,
+    need: tuple[float, float],
+    name: str,
+    moment: tuple[str, float],
+    most: float,
+    limit: float | None = None,
 ) -> ListRow:
-    """What a joint needs at a moment, as a bar of its limit, or else of the most that any joint needs."""
-    note, share = _sized(value, motor.unit), value / (limit or most or 1.0)
+    """What a joint needs at a moment with its tolerance, as a bar of its limit, or else of the most that any joint
+    needs."""
+    value, share = within(*need, decimals=1 if need[0] < TENS else 0), need[0] / (limit or most or 1.0)
     if limit:
-        note = tr("{value} of {limit}", value=number(value, 2), limit=_sized(limit, motor.unit))
-    parts, mark = [Part(min(1.0, share), 1.0, "rest")], _mark(motor) if limit else "none"
-    return ListRow(mark, name, note, f"#{moment[0]}", moment, float(share > SEEN), parts)
-
-
-def _sized(value: float, unit: model.Unit) -> str:
-    """A torque or force to two digits."""
-    return with_unit(number(value, 2), unit)
+        value = tr("{value} of {limit}", value=value, limit=number(limit, 2))
+    mark = _mark(motor) if limit else "none"
+    return ListRow(mark, name, with_unit(value, motor.unit), f"#{moment[0]}", moment, min(1.0, share))
 
 
 def _links(summary: model.DynamicsSummary) -> list[list[str]]:

@@ -43,11 +43,15 @@ def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> 
     events = events or [PlayedEvent(0.0, SHOWN_S, outcome_word(target.outcome), "fail")]
     marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
     if near and near.shifted_to_mm and near.least_shift_mm:
-        short = tr("{far} short", far=with_unit(fixed(near.least_shift_mm, 0), "mm"))
-        marks.append(_line(near.shifted_to_mm, target.xyz_mm, short, len(q)))
+        marks.append(_line(near.shifted_to_mm, target.xyz_mm, short_of(near.least_shift_mm), len(q)))
     marks += _numbers(robot, q[:MAX_GHOSTS]) if len(q) > 1 else []
     t = np.arange(len(q))[:, None] + [0.0, SHOWN_S]
     return PlayedMotion(target.name, "", t.ravel(), np.repeat(q, 2, axis=0), events, marks, ghosts=list(q[:MAX_GHOSTS]))
+
+
+def short_of(far_mm: float) -> str:
+    """By how much the arm does not get to a target, in few words."""
+    return tr("{far} short", far=with_unit(fixed(far_mm, 0), "mm"))
 
 
 def _numbers(robot: Robot, q: Reals) -> list[Mark]:

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.finding import is_one
-from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.language import first_sentence, tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import NEAREST_RULE
 from er3a.pipeline.messages.kinematics import branch_word
@@ -19,7 +19,13 @@ from er3a.pipeline.messages.say import joined, listed, say
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
-from er3a.pipeline.stages.inverse.page.played import SHOWN_S, refusal_in_short, solutions_played, with_singularity
+from er3a.pipeline.stages.inverse.page.played import (
+    SHOWN_S,
+    refusal_in_short,
+    short_of,
+    solutions_played,
+    with_singularity,
+)
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
@@ -96,17 +102,18 @@ def _singular(target: model.TargetResult) -> bool:
 
 def _row(target: model.TargetResult) -> ListRow:
     """A target: how clear the chosen solution is and how many serve it, or what it came to."""
-    note = outcome_word(target.outcome)
+    near = target.neighbours
+    note = short_of(near.least_shift_mm) if near and near.least_shift_mm else outcome_word(target.outcome)
     if target.outcome == "reached":
         ways = tr("{within} of {all} ways", within=target.within_limits, all=target.solutions)
-        near = target.clearance
-        clear = [tr("{far} clear", far=with_unit(fixed(near.least_mm, 0), "mm"))] if near else []
+        gap = target.clearance
+        clear = [tr("{far} clear", far=with_unit(fixed(gap.least_mm, 0), "mm"))] if gap else []
         note = joined([*clear, ways], " · ")
     mark: Literal["pass", "caution", "fail"] = "fail"
     if target.outcome == "reached":
         mark = "caution" if _singular(target) else "pass"
     advice = listed(target.advice) if mark == "fail" else ()
-    fix = Fix(advice[-1], f"#{target.name}-solutions") if advice else None
+    fix = Fix(first_sentence(advice[-1])[0], f"#{target.name}") if advice else None
     return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
 
 
@@ -126,7 +133,6 @@ def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows)
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
         listed=_solutions_listed(target.name, branches, cells),
-        turned=rows.within_limits.sum() > branches.within_limits.sum(),
     )
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from math import pi
 from typing import Any
 
 from er3a.confirmation.plan import plan
 from er3a.errors import Er3aError
-from er3a.identifiability.entries import column_of
+from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Status
 from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.confirm import on_pendant
@@ -79,6 +79,8 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     left.sort(key=lambda each: (not each.off.moves, _unbounded(each), -each.off.mm, -each.off.deg))
     proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
     present = {each.status for each in numbers}
+    first = [ListRow("fail", each.entry, _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
+    bad = evidence.contradicted
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(robot, by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
@@ -90,17 +92,35 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         open_columns=OPEN_COLUMNS,
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
-        first=[
-            ListRow(
-                "fail" if each.status == "contradicted" else "caution",
-                each.entry,
-                _tool_off(each),
-                f"#entry-{each.entry}",
-            )
-            for each in left[:FIRST]
-        ],
-        left=len(evidence.unconfirmed) + evidence.contradicted,
+        first=first if bad else to_confirm(evidence),
+        left=len(evidence.unconfirmed) + bad if bad else 0,
     )
+
+
+def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
+    """What to do before the real arm moves, each with how far the tool is off if what it finds out is wrong, and the
+    place on the page that says how; all of it where no document speaks of the table."""
+    left = evidence.unconfirmed if evidence else []
+    directions = [entry for entry in left if column_of(entry) == "direction"]
+    values = [entry for entry in left if column_of(entry) in (*CONTINUOUS, "beta")]
+    limits = [entry for entry in left if column_of(entry) in LIMITS]
+    named = joined(values[:3], ", ") + (" …" if len(values) > 3 else "") or tr("the table")
+    asked = (
+        (tr("Jog each joint: does it turn as drawn?"), directions, "cell-direction1"),
+        (tr("Read five poses: they settle {names}.", names=named), values, "poses"),
+        (tr("Enter limits and speeds from the controller."), limits, f"entry-{limits[0]}" if limits else ""),
+    )
+    return [
+        ListRow("caution", text, _worst_off(evidence, entries), f"#{place}")
+        for text, entries, place in asked
+        if entries or evidence is None
+    ]
+
+
+def _worst_off(evidence: TableEvidence | None, entries: Sequence[str]) -> str:
+    """How far the worst of some entries puts the tool off; empty where none moves it."""
+    found = [each for each in (evidence.entries if evidence else ()) if each.entry in entries and each.off.moves]
+    return _tool_off(max(found, key=lambda each: (each.off.mm, each.off.deg))) if found else ""
 
 
 def known_alone(evidence: TableEvidence) -> int:

@@ -22,14 +22,14 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
 from er3a.pipeline.viewing.figures import bars, new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
     panel_link,
     render_stage,
 )
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, MUTED
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 
 MAX_IMAGES = 9
 WIDEST_PX = 480
@@ -107,13 +107,16 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
 
 def error_picture(each: model.ObjectResult, task: VisionFile) -> Picture:
     """By how much the tool misses an object, by cause, and what the gripper tolerates."""
-    allowed = min(task.gripper.tolerance_mm), min(task.gripper.tolerance_deg)
-    sizes = [*((getattr(each.error_mm, part), getattr(each.error_deg, part)) for part in PARTS), allowed]
-    names = [*(word("vision.part_of_error", PARTS, part) for part in PARTS), tr("gripper's tolerance")]
+    sizes = [(getattr(each.error_mm, part), getattr(each.error_deg, part)) for part in PARTS]
+    names = [word("vision.part_of_error", PARTS, part) for part in PARTS]
     texts = [f"{fixed(mm, 2)} mm, {fixed(deg, 2)}°" for mm, deg in sizes]
-    figure, ax = bars(names, np.array(sizes)[:, 0], texts, [*[MODEL] * len(PARTS), MUTED])
+    figure, ax = bars(names, np.array(sizes)[:, 0], texts, [MODEL] * len(PARTS))
+    allowed_mm, allowed_deg = min(task.gripper.tolerance_mm), min(task.gripper.tolerance_deg)
+    text = tr("tolerated: {mm} mm, {deg}°", mm=f"{allowed_mm:g}", deg=f"{allowed_deg:g}")
+    ax.axvline(allowed_mm, color=HIGHLIGHT, label=text)
+    ax.legend(loc="lower right", bbox_to_anchor=(1, 1))
     ax.set_xlabel(tr("error (mm)"))
-    caption = tr("What 95 % of errors stay below, by cause.")
+    caption = tr("What 95 % of errors stay below, by cause; the line is what the gripper tolerates.")
     return Picture(figure, caption, caption)
 
 
@@ -137,7 +140,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         study,
         stored,
         output,
-        _answer(results),
+        _answer(results, task),
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
@@ -158,7 +161,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     )
 
 
-def _answer(results: model.VisionResults) -> Answer:
+def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
     """How many objects can be grasped, what that leaves open, and how well the camera's place is known."""
     summary = results.summary
     grasped = [each for each in summary.objects if each.grasp]
@@ -173,7 +176,8 @@ def _answer(results: model.VisionResults) -> Answer:
     keys = []
     if off := [each.error_mm.together for each in grasped if each.error_mm]:
         made = tr("error at the grasp, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
-        keys = [(with_unit(fixed(max(off), 1), "mm"), made)]
+        allowed = with_unit(f"{min(task.gripper.tolerance_mm):g}", "mm")
+        keys = [(tr("{value} of {limit}", value=fixed(max(off), 1), limit=allowed), made)]
     elif found:
         half = max(found.hand_eye.half_width_mm)
         keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
@@ -186,7 +190,9 @@ def _answer(results: model.VisionResults) -> Answer:
         rows = [ListRow("caution", each.sample, _why_left_out(each), "#samples") for each in found.suspects]
         rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
-    return Answer(headline, rest, "", keys, groups)
+    gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
+    text = tr("give the tool a shape: “carried” in the scene's file.")
+    return Answer(headline, rest, "", keys, groups, Fix(text, "#verdict", False) if "gripper" in gaps else None)
 
 
 def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
@@ -195,7 +201,7 @@ def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
         return ListRow("fail", each.name, refusal_text(each), f"#{each.name}", moment)
     sure = each.grasp.probability
     note = tr("{percent} % succeed", percent=fixed(100 * sure, 1))
-    return ListRow("pass", each.name, note, f"#{each.name}", moment, 1.0, [Part(sure, 1.0, "rest")])
+    return ListRow("pass", each.name, note, f"#{each.name}", moment)
 
 
 def _why_left_out(found: Finding) -> str:

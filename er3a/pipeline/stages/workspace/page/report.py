@@ -11,7 +11,7 @@ from markupsafe import Markup
 from er3a.collision.scene import Scene
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
-from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
+from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
@@ -97,13 +97,16 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
 
 def _void_as_row(number_: int, void: model.VoidSummary, planned: bool) -> ListRow:
     """A void: what kind, how large; ``planned``: whether there is a view from above."""
-    size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
+    size = workspace_figures.litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
+    note = with_unit(size, "L")
     of_one = {joint for limit in void.cause.params.get("limits", ()) for joint in limit.joints} == {1}
     name = tr(workspace_figures.VOID_NAMES[void.kind], number=number_)
-    if void.holds_shoulder or of_one:
-        name = tr("at the shoulder: normal") if void.holds_shoulder else tr("in the dead zone")
+    if void.holds_shoulder:
+        name, note = tr("at the shoulder"), tr("{size}: normal", size=note)
+    elif of_one:
+        name = tr("in the dead zone")
     address = f"#hole-{number_}" if void.kind == "enclosed" else "#dead" if of_one and planned else f"#void-{number_}"
-    return ListRow("none", name, with_unit(size, "L"), address)
+    return ListRow("none", name, note, address)
 
 
 def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
@@ -137,15 +140,10 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     return [
         str(row),
         tr(workspace_figures.VOID_NAMES[void.kind], number=row),
-        _litres(low, high),
+        workspace_figures.litres(low, high),
         *map(millimetres, (void.centroid_m, void.low_m, void.high_m)),
         say(void.cause),
     ]
-
-
-def _litres(low: float, high: float) -> str:
-    """Bounds of a volume in litres, rounded outwards."""
-    return tr("{low} to {high}", low=at_least(low, "L"), high=at_most(high, "L"))
 
 
 def _section_caption(summary: model.WorkspaceSummary) -> str:
