@@ -17,12 +17,12 @@ from er3a.pipeline.player.motions import at_rest
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
-from er3a.pipeline.stages.dynamics.page.played import FELT, hanging, held, holding_name, motions, within
+from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, motions, within
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark
 from er3a.pipeline.viewing.figures import axis_label, bars, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import INK, JOINTS
+from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
@@ -32,15 +32,13 @@ KEY: dict[str, Any] = {
     "columnspacing": 1.0,
     "borderaxespad": 0.1,
 }  # above its axes
-STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
-    """Torques of all joints with their intervals, and the parts of the most loaded one."""
+    """Torques of all joints with their intervals, and what most of the greatest comes from."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, (torque, parts) = new_figure(2, 1, 5.2, 4.0, sharex=True)
+    figure, torque = new_figure(width=5.2, height=3.6)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
-    worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
         colour = JOINTS[j % len(JOINTS)]
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
@@ -54,18 +52,11 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
             (tr("gravity"), tr("inertia"), tr("Coriolis, centrifugal"), tr("friction"), tr("forces at the tool")),
         )
     )
-    for part, style in zip(model.PARTS, STYLES):
-        values = getattr(rows, part)[:, worst]
-        if np.abs(values).max() < FELT * load.peak:
-            continue
-        parts.plot(rows.t_s, values, color=INK, linestyle=style, label=names[part])
-    parts.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
-    parts.set_ylabel(tr("J{joint} ({unit})", joint=worst + 1, unit=load.unit))
-    parts.set_xlabel(axis_label(rows, "t_s"))
+    torque.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
     caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
-    alt = tr("Panels over time for {path}: torques, their contributions.", path=path.name)
-    return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts)])
+    alt = tr("Torques over time for {path}.", path=path.name)
+    return Picture(figure, alt, caption, [(torque, path.name)])
 
 
 def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.HoldingTorque) -> Picture | None:
@@ -86,7 +77,6 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
 
 MAX_USES = 12
 NONE = "–"
-TENS = 10.0  # from here on a figure has no decimals
 SEEN = 0.02  # of the longest bar, below which one is a speck
 WITHOUT = words({"load": "load", "friction": "friction", "rotor_inertias": "rotors", "link_masses": "some masses"})
 
@@ -225,7 +215,7 @@ def _row(
 ) -> ListRow:
     """What a joint needs at a moment with its tolerance, as a bar of its limit, or else of the most that any joint
     needs."""
-    value, share = within(*need, decimals=1 if need[0] < TENS else 0), need[0] / (limit or most or 1.0)
+    value, share = within(*need, decimals=1), need[0] / (limit or most or 1.0)
     if limit:
         value = tr("{value} of {limit}", value=value, limit=number(limit, 2))
     mark = _mark(motor) if limit else "none"

@@ -101,14 +101,11 @@ def _singular(target: model.TargetResult) -> bool:
 
 
 def _row(target: model.TargetResult) -> ListRow:
-    """A target: how clear the chosen solution is and how many serve it, or what it came to."""
+    """A target: how clear the chosen solution is, or what it came to."""
     near = target.neighbours
     note = short_of(near.least_shift_mm) if near and near.least_shift_mm else outcome_word(target.outcome)
-    if target.outcome == "reached":
-        ways = tr("{within} of {all} ways", within=target.within_limits, all=target.solutions)
-        gap = target.clearance
-        clear = [tr("{far} clear", far=with_unit(fixed(gap.least_mm, 0), "mm"))] if gap else []
-        note = joined([*clear, ways], " · ")
+    if target.clearance:
+        note = tr("{far} mm clear", far=fixed(target.clearance.least_mm, 1))
     mark: Literal["pass", "caution", "fail"] = "fail"
     if target.outcome == "reached":
         mark = "caution" if _singular(target) else "pass"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from math import pi
 from typing import Any
@@ -34,7 +34,7 @@ MARKS: Mapping[Status, str] = {
     "gauge": "↔",
     "given": "·",
 }
-FIRST = 8  # entries to settle, named at the table's side
+FIRST = 5  # entries to settle, named at the table's side
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
     "a": "a (mm)",
@@ -67,7 +67,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
     legend, and the entries in words; rows of entries begin with the name, which is the address on the page. Those
     not settled come by how far the tool may be off, then those without a bound, then those that don't move it;
-    ``first``: the first of all ``left``."""
+    ``first``: the worst of those that evidence contradicts, or else what to do."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in evidence.entries}
@@ -80,7 +80,6 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
     present = {each.status for each in numbers}
     first = [ListRow("fail", each.entry, _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
-    bad = evidence.contradicted
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(robot, by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
@@ -92,35 +91,28 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         open_columns=OPEN_COLUMNS,
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
-        first=first if bad else to_confirm(evidence),
-        left=len(evidence.unconfirmed) + bad if bad else 0,
+        first=first if evidence.contradicted else to_confirm(evidence),
     )
 
 
 def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
-    """What to do before the real arm moves, each with how far the tool is off if what it finds out is wrong, and the
-    place on the page that says how; all of it where no document speaks of the table."""
-    left = evidence.unconfirmed if evidence else []
-    directions = [entry for entry in left if column_of(entry) == "direction"]
-    values = [entry for entry in left if column_of(entry) in (*CONTINUOUS, "beta")]
-    limits = [entry for entry in left if column_of(entry) in LIMITS]
-    named = joined(values[:3], ", ") + (" …" if len(values) > 3 else "") or tr("the table")
-    asked = (
-        (tr("Jog each joint: does it turn as drawn?"), directions, "cell-direction1"),
-        (tr("Read five poses: they settle {names}.", names=named), values, "poses"),
-        (tr("Enter limits and speeds from the controller."), limits, f"entry-{limits[0]}" if limits else ""),
+    """What to do before the real arm moves, each with how far the tool is off if the worst that it finds out is wrong,
+    and the place on the page that says how; all of it where no document speaks of the table."""
+    left = [each for each in evidence.entries if each.entry in evidence.unconfirmed] if evidence else []
+    steps = (
+        (N_("Jog each joint: does it turn as drawn?"), ("direction",), "cell-direction1"),
+        (N_("Read five poses: they settle {names}."), (*CONTINUOUS, "beta"), "poses"),
+        (N_("Enter limits and speeds from the controller."), LIMITS, "cell-lower1"),
     )
-    return [
-        ListRow("caution", text, _worst_off(evidence, entries), f"#{place}")
-        for text, entries, place in asked
-        if entries or evidence is None
-    ]
-
-
-def _worst_off(evidence: TableEvidence | None, entries: Sequence[str]) -> str:
-    """How far the worst of some entries puts the tool off; empty where none moves it."""
-    found = [each for each in (evidence.entries if evidence else ()) if each.entry in entries and each.off.moves]
-    return _tool_off(max(found, key=lambda each: (each.off.mm, each.off.deg))) if found else ""
+    rows = []
+    for text, kinds, place in steps:
+        own = [each for each in left if column_of(each.entry) in kinds]
+        named = joined([each.entry for each in own[:3]], ", ") + (" …" if len(own) > 3 else "") or tr("the table")
+        worst = max(own, key=lambda each: (each.off.mm, each.off.deg), default=None)
+        if own or evidence is None:
+            off = _tool_off(worst) if worst and worst.off.moves else ""
+            rows.append(ListRow("caution", tr(text, names=named), off, f"#{place}"))
+    return rows
 
 
 def known_alone(evidence: TableEvidence) -> int:

@@ -196,8 +196,7 @@ def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[t
     labels, lines = [], []
     for each in disputed:
         step = BELOW * each.measured
-        text = joined([say(each.subject), _apart(each)], ": ")
-        labels.append(Label(text, np.array([0.0, -step]), "open", SEEN, written_there=True))
+        labels.append(Label(say(each.subject), np.array([0.0, -step]), "open", SEEN, written_there=True))
         for row, stated in enumerate(each.statements, 2):
             kind: LabelKind = "right" if stated.met else "open"
             text = joined([with_unit(fixed(stated.expected, 1), each.unit), own_title(stated.document)], ": ")

@@ -175,7 +175,9 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
         headline, rest = joined([headline, rest], " "), ""
     keys = []
     if off := [each.error_mm.together for each in grasped if each.error_mm]:
-        made = tr("error at the grasp, 95 %, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
+        made = (
+            tr("error at the grasp, 95 %, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
+        )
         allowed = with_unit(f"{min(task.gripper.tolerance_mm):g}", "mm")
         keys = [(tr("{value} of {limit}", value=fixed(max(off), 1), limit=allowed), made)]
     elif found:

@@ -49,7 +49,6 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         stored,
         output,
         _answer(summary, placing, [] if known else [payload_key(known, robot)]),
-        at_side=placing,  # the plan of the tray
         plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
         labelled=_labelled(robot, results, scene, "wrong" if contradicted else "right"),
         turning=workspace_figures.in_space(robot, results, scene, placing.tray if placing else None),
