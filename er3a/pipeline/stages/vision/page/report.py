@@ -111,12 +111,10 @@ def error_picture(each: model.ObjectResult, task: VisionFile) -> Picture:
     names = [word("vision.part_of_error", PARTS, part) for part in PARTS]
     texts = [f"{fixed(mm, 2)} mm, {fixed(deg, 2)}°" for mm, deg in sizes]
     figure, ax = bars(names, np.array(sizes)[:, 0], texts, [MODEL] * len(PARTS))
-    allowed_mm, allowed_deg = min(task.gripper.tolerance_mm), min(task.gripper.tolerance_deg)
-    text = tr("tolerated: {mm} mm, {deg}°", mm=f"{allowed_mm:g}", deg=f"{allowed_deg:g}")
-    ax.axvline(allowed_mm, color=HIGHLIGHT, label=text)
+    ax.axvline(min(task.gripper.tolerance_mm), color=HIGHLIGHT, label=tr("gripper's tolerance"))
     ax.legend(loc="lower right", bbox_to_anchor=(1, 1))
     ax.set_xlabel(tr("error (mm)"))
-    caption = tr("What 95 % of errors stay below, by cause; the line is what the gripper tolerates.")
+    caption = tr("What 95 % of errors stay below, by cause.")
     return Picture(figure, caption, caption)
 
 

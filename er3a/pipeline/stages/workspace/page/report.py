@@ -86,7 +86,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
         *payload,
     ]
     # The void that the picture shows comes first.
-    voids = sorted(enumerate(summary.voids, start=1), key=lambda each: each[1].kind != "enclosed")
+    voids = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     groups = (
         Group(tr("Where the tray goes"), _tray_as_rows(placing)),
         Group(tr("Voids"), [_void_as_row(*each, bool(placing)) for each in voids]),
