@@ -101,7 +101,8 @@ def _(results: VisionResults) -> Glance:
     caught = sum(not each.grasp and each.outcome == each.expect for each in objects)
     grasped = sum(bool(each.grasp) for each in objects)
     simulated = results.summary.calibration is not None and results.summary.calibration.simulated
-    return f"{grasped}/{len(objects) - caught}", tr("simulated") if simulated else _caught(caught)
+    note = tr("simulated") if simulated else _caught(caught)
+    return f"{grasped}/{len(objects) - caught}", tr("not fully checked") if results.summary.verdict.missed else note
 
 
 def _caught(count: int) -> str:

@@ -10,8 +10,6 @@ from typing import Any
 
 from er3a.files.kept_files import write_text
 from er3a.finding import is_one
-from er3a.identifiability.entries import CONTINUOUS, column_of
-from er3a.identifiability.evidence import LIMITS
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.say import joined
@@ -22,6 +20,7 @@ from er3a.pipeline.overview.tiles import first_with, motions_tile, table_tile, t
 from er3a.pipeline.results import THE_CODE, THE_SETTINGS, Provenance, Stored, is_computed, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.model import ValidationResults
+from er3a.pipeline.stages.validation.page.evidence_section import to_confirm
 from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
@@ -210,18 +209,7 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     address = f"{chosen.name}/validation.html"
     if not isinstance(results, ValidationResults):
         return [(tr("Validate the table."), address)]
-    evidence = results.summary.evidence
-    unsettled = evidence.unconfirmed if evidence else []
-    directions = [entry for entry in unsettled if column_of(entry) == "direction"]
-    left = [entry for entry in unsettled if column_of(entry) in (*CONTINUOUS, "beta")]
-    limits = [entry for entry in unsettled if column_of(entry) in LIMITS]
-    named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
-    asked = (
-        (tr("Jog each joint: does it turn as drawn?"), directions, "cell-direction1"),
-        (tr("Read five poses: they settle {names}.", names=named), left, "poses"),
-        (tr("Enter limits and speeds from the controller."), limits, f"entry-{limits[0]}" if limits else ""),
-    )
-    return [(text, f"{address}#{place}") for text, entries, place in asked if entries or not evidence]
+    return [(row.name, address + row.address) for row in to_confirm(results.summary.evidence)]
 
 
 def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Mapping[str, Results]) -> list[Any]:

@@ -17,12 +17,12 @@ from er3a.pipeline.player.motions import at_rest
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
-from er3a.pipeline.stages.dynamics.page.played import FELT, hanging, held, holding_name, motions, within
+from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, motions, within
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark
 from er3a.pipeline.viewing.figures import axis_label, bars, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import INK, JOINTS
+from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
@@ -32,15 +32,13 @@ KEY: dict[str, Any] = {
     "columnspacing": 1.0,
     "borderaxespad": 0.1,
 }  # above its axes
-STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
-    """Torques of all joints with their intervals, and the parts of the most loaded one."""
+    """Torques of all joints with their intervals, and what most of the greatest comes from."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, (torque, parts) = new_figure(2, 1, 5.2, 4.0, sharex=True)
+    figure, torque = new_figure(width=5.2, height=3.6)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
-    worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
         colour = JOINTS[j % len(JOINTS)]
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
@@ -54,18 +52,11 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
             (tr("gravity"), tr("inertia"), tr("Coriolis, centrifugal"), tr("friction"), tr("forces at the tool")),
         )
     )
-    for part, style in zip(model.PARTS, STYLES):
-        values = getattr(rows, part)[:, worst]
-        if np.abs(values).max() < FELT * load.peak:
-            continue
-        parts.plot(rows.t_s, values, color=INK, linestyle=style, label=names[part])
-    parts.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
-    parts.set_ylabel(tr("J{joint} ({unit})", joint=worst + 1, unit=load.unit))
-    parts.set_xlabel(axis_label(rows, "t_s"))
+    torque.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
     caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
-    alt = tr("Panels over time for {path}: torques, their contributions.", path=path.name)
-    return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts)])
+    alt = tr("Torques over time for {path}.", path=path.name)
+    return Picture(figure, alt, caption, [(torque, path.name)])
 
 
 def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.HoldingTorque) -> Picture | None:
@@ -86,8 +77,7 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
 
 MAX_USES = 12
 NONE = "–"
-LEAST = 0.01  # N m or N, below which no motor feels anything
-SEEN = 0.02  # of a bar, below which it is a speck
+SEEN = 0.02  # of the longest bar, below which one is a speck
 WITHOUT = words({"load": "load", "friction": "friction", "rotor_inertias": "rotors", "link_masses": "some masses"})
 
 
@@ -166,27 +156,33 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
-    rows = []
+    loads = [load for path in summary.paths if path.counts for load in path.joints]
+    rows, idle = [], []
     for motor in order:
-        if limited or motor.peak >= LEAST:
-            moment = _moment_of(results, motor)
-            name = joined([f"J{motor.joint}", moment[0]], ", ")
-            rows.append(_row(motor, motor.peak, name, moment, longest, motor.peak_limit))
-    if idle := [motor.joint for motor in order[len(rows) :]]:
-        loads = [load for path in summary.paths if path.counts for load in path.joints if load.joint in idle]
-        most = at_most(max(load.peak + load.tolerance for load in loads), 1)
-        names = joined((f"J{joint}" for joint in idle), ", ")
-        rows.append(ListRow("none", names, with_unit(f"≤ {most}", order[-1].unit), "#motors"))
+        if not limited and motor.unit == worst.unit and motor.peak < SEEN * longest:
+            idle.append(motor.joint)
+            continue
+        moment = _moment_of(results, motor)
+        name = joined([f"J{motor.joint}", moment[0]], ", ")
+        off = max(load.tolerance for load in loads if load.joint == motor.joint and load.peak == motor.peak)
+        rows.append(_row(motor, (motor.peak, off), name, moment, longest, motor.peak_limit))
+    if idle:
+        most = at_most(max(load.peak + load.tolerance for load in loads if load.joint in idle), 1)
+        names = joined((f"J{joint}" for joint in sorted(idle)), ", ")
+        rows.append(ListRow("none", names, with_unit(f"≤ {most}", worst.unit), "#motors"))
     still = [
-        _row(motor, motor.holding, name, (name, 0.0), longest)
+        _row(
+            motor, (motor.holding, held.tolerance), holding_name(motor.joint), (holding_name(motor.joint), 0.0), longest
+        )
         for motor in order
-        if motor.holding >= LEAST and (name := holding_name(motor.joint))
+        for held in summary.holding
+        if held.joint == motor.joint and motor.holding >= SEEN * longest
     ]
     left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
     return Answer(
         headline,
         "",
-        tr("Without {parts}.", parts=joined(left, ", ")) if left else "",
+        tr("At least: without {parts}.", parts=joined(left, ", ")) if left else "",
         [
             (moving, tr("J{joint} moving", joint=worst.joint)),
             (holding, tr("J{joint} holding", joint=worst.joint)),
@@ -210,19 +206,20 @@ def _mark(motor: model.MotorNeed) -> Mark:
 
 
 def _row(
-    motor: model.MotorNeed, value: float, name: str, moment: tuple[str, float], most: float, limit: float | None = None
+    motor: model.MotorNeed,
+    need: tuple[float, float],
+    name: str,
+    moment: tuple[str, float],
+    most: float,
+    limit: float | None = None,
 ) -> ListRow:
-    """What a joint needs at a moment, as a bar of its limit, or else of the most that any joint needs."""
-    note, share = _sized(value, motor.unit), value / (limit or most or 1.0)
+    """What a joint needs at a moment with its tolerance, as a bar of its limit, or else of the most that any joint
+    needs."""
+    value, share = within(*need, decimals=1), need[0] / (limit or most or 1.0)
     if limit:
-        note = tr("{value} of {limit}", value=number(value, 2), limit=_sized(limit, motor.unit))
-    parts, mark = [Part(min(1.0, share), 1.0, "rest")], _mark(motor) if limit else "none"
-    return ListRow(mark, name, note, f"#{moment[0]}", moment, float(share > SEEN), parts)
-
-
-def _sized(value: float, unit: model.Unit) -> str:
-    """A torque or force to two digits."""
-    return with_unit(number(value, 2), unit)
+        value = tr("{value} of {limit}", value=value, limit=number(limit, 2))
+    mark = _mark(motor) if limit else "none"
+    return ListRow(mark, name, with_unit(value, motor.unit), f"#{moment[0]}", moment, min(1.0, share))
 
 
 def _links(summary: model.DynamicsSummary) -> list[list[str]]:

@@ -7,7 +7,6 @@ import numpy as np
 from er3a.finding import Finding, is_one
 from er3a.geometry.transforms import transform
 from er3a.kinematics.inverse import inverse
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import limits_in_short
@@ -16,11 +15,9 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
 from er3a.pipeline.stages.inverse.model import SINGULAR_PARTS, SolutionRows, TargetResult
-from er3a.pipeline.viewing.drawn import poses_at
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-SPECK_MM = 1.0  # length of the stroke that a number is written at
 SHOWN_S = 0.9  # how long the player shows a solution, before it moves to the next one for a tenth of a second
 Position = tuple[float, float, float]
 MAX_GHOSTS = 8  # solutions that are drawn at a time: more hide each other
@@ -43,23 +40,14 @@ def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> 
     events = events or [PlayedEvent(0.0, SHOWN_S, outcome_word(target.outcome), "fail")]
     marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
     if near and near.shifted_to_mm and near.least_shift_mm:
-        short = tr("{far} short", far=with_unit(fixed(near.least_shift_mm, 0), "mm"))
-        marks.append(_line(near.shifted_to_mm, target.xyz_mm, short, len(q)))
-    marks += _numbers(robot, q[:MAX_GHOSTS]) if len(q) > 1 else []
+        marks.append(_line(near.shifted_to_mm, target.xyz_mm, short_of(near.least_shift_mm), len(q)))
     t = np.arange(len(q))[:, None] + [0.0, SHOWN_S]
     return PlayedMotion(target.name, "", t.ravel(), np.repeat(q, 2, axis=0), events, marks, ghosts=list(q[:MAX_GHOSTS]))
 
 
-def _numbers(robot: Robot, q: Reals) -> list[Mark]:
-    """The numbers of solutions (N, n), rad or m, each at the joint that parts most of them; one mark for those that
-    share its place."""
-    points = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
-    places = 10 * np.round(100 * points)  # mm, to a centimetre
-    parted = [len(np.unique(own, axis=0)) for own in places.swapaxes(0, 1)]
-    numbers: dict[Position, list[str]] = {}
-    for k, (x, y, z) in enumerate(places[:, np.argmax(parted)].tolist()):
-        numbers.setdefault((x, y, z), []).append(str(k + 1))
-    return [_line((x, y, z), (x, y, z + SPECK_MM), ", ".join(own), len(q)) for (x, y, z), own in numbers.items()]
+def short_of(far_mm: float) -> str:
+    """By how much the arm does not get to a target, in few words."""
+    return tr("{far} short", far=with_unit(fixed(far_mm, 0), "mm"))
 
 
 def _solution_event(rows: SolutionRows, k: int) -> PlayedEvent:

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.finding import is_one
-from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.language import first_sentence, tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import NEAREST_RULE
 from er3a.pipeline.messages.kinematics import branch_word
@@ -19,11 +19,16 @@ from er3a.pipeline.messages.say import joined, listed, say
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
-from er3a.pipeline.stages.inverse.page.played import SHOWN_S, refusal_in_short, solutions_played, with_singularity
+from er3a.pipeline.stages.inverse.page.played import (
+    SHOWN_S,
+    refusal_in_short,
+    short_of,
+    solutions_played,
+    with_singularity,
+)
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
-from er3a.pipeline.viewing.palette import SOLUTIONS
 from er3a.robots.robot import Robot
 
 NO_BREAK_SPACE = "\u00a0"
@@ -50,19 +55,18 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target)) for target in chosen],
         sliding=_sliding(robot),
-        colours=SOLUTIONS,
     )
 
 
 def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
-    """A target that is not reached and should be, or else one that the most solutions serve, none of them chosen for
-    want of one that is not singular: of these the farthest from axis 1, where they differ most."""
+    """A target that is not reached and should be, or else the one with the least clearance, rather one that is served
+    without a singular pose."""
     ranks = {
         each.name: (
             each.outcome in ("reached", each.expect),
             is_one(each.reason, "nearest_regular") or _singular(each),
+            each.clearance.least_mm if each.clearance else np.inf,
             -each.within_limits,
-            -np.hypot(*each.xyz_mm[:2]),
         )
         for each in shown
     }
@@ -84,7 +88,7 @@ def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) 
         "",
         keys,
         (
-            Group(tr("No solution to take"), [row for row in rows if row.mark == "fail"]),
+            Group(tr("Not reached"), [row for row in rows if row.mark == "fail"]),
             Group(tr("Reached"), [row for row in rows if row.mark != "fail"]),
         ),
         next((row.fix for row in rows if row.fix), None),
@@ -97,24 +101,17 @@ def _singular(target: model.TargetResult) -> bool:
 
 
 def _row(target: model.TargetResult) -> ListRow:
-    """A target: how many branches serve it, or what it came to."""
-    note = (
-        tr("{within} of {all} within limits", within=target.within_limits, all=target.solutions)
-        if target.outcome == "reached"
-        else outcome_word(target.outcome)
-    )
+    """A target: how clear the chosen solution is, or what it came to."""
+    near = target.neighbours
+    note = short_of(near.least_shift_mm) if near and near.least_shift_mm else outcome_word(target.outcome)
+    if target.clearance:
+        note = tr("{far} mm clear", far=fixed(target.clearance.least_mm, 1))
     mark: Literal["pass", "caution", "fail"] = "fail"
     if target.outcome == "reached":
         mark = "caution" if _singular(target) else "pass"
-    parts = (
-        [Part(target.within_limits / target.solutions, 1.0, "fail" if mark == "fail" else "rest")]
-        if target.solutions > target.within_limits
-        else ()
-    )
-    length = 1.0 if target.solutions else 0.0
     advice = listed(target.advice) if mark == "fail" else ()
-    fix = Fix(advice[-1], f"#{target.name}-solutions") if advice else None
-    return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), length, parts, fix)
+    fix = Fix(first_sentence(advice[-1])[0], f"#{target.name}") if advice else None
+    return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
 
 
 def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> dict[str, Any]:
@@ -133,7 +130,6 @@ def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows)
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
         listed=_solutions_listed(target.name, branches, cells),
-        turned=rows.within_limits.sum() > branches.within_limits.sum(),
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from er3a.confirmation.plan import plan
 from er3a.errors import Er3aError
-from er3a.identifiability.entries import column_of
+from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Status
 from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.confirm import on_pendant
@@ -34,7 +34,7 @@ MARKS: Mapping[Status, str] = {
     "gauge": "↔",
     "given": "·",
 }
-FIRST = 8  # entries to settle, named at the table's side
+FIRST = 5  # entries to settle, named at the table's side
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
     "a": "a (mm)",
@@ -67,7 +67,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
     legend, and the entries in words; rows of entries begin with the name, which is the address on the page. Those
     not settled come by how far the tool may be off, then those without a bound, then those that don't move it;
-    ``first``: the first of all ``left``."""
+    ``first``: the worst of those that evidence contradicts, or else what to do."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in evidence.entries}
@@ -79,6 +79,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     left.sort(key=lambda each: (not each.off.moves, _unbounded(each), -each.off.mm, -each.off.deg))
     proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
     present = {each.status for each in numbers}
+    first = [ListRow("fail", each.entry, _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(robot, by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
@@ -90,17 +91,28 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         open_columns=OPEN_COLUMNS,
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
-        first=[
-            ListRow(
-                "fail" if each.status == "contradicted" else "caution",
-                each.entry,
-                _tool_off(each),
-                f"#entry-{each.entry}",
-            )
-            for each in left[:FIRST]
-        ],
-        left=len(evidence.unconfirmed) + evidence.contradicted,
+        first=first if evidence.contradicted else to_confirm(evidence),
     )
+
+
+def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
+    """What to do before the real arm moves, each with how far the tool is off if the worst that it finds out is wrong,
+    and the place on the page that says how; all of it where no document speaks of the table."""
+    left = [each for each in evidence.entries if each.entry in evidence.unconfirmed] if evidence else []
+    steps = (
+        (N_("Jog each joint: does it turn as drawn?"), ("direction",), "cell-direction1"),
+        (N_("Read five poses: they settle {names}."), (*CONTINUOUS, "beta"), "poses"),
+        (N_("Enter limits and speeds from the controller."), LIMITS, "cell-lower1"),
+    )
+    rows = []
+    for text, kinds, place in steps:
+        own = [each for each in left if column_of(each.entry) in kinds]
+        named = joined([each.entry for each in own[:3]], ", ") + (" …" if len(own) > 3 else "") or tr("the table")
+        worst = max(own, key=lambda each: (each.off.mm, each.off.deg), default=None)
+        if own or evidence is None:
+            off = _tool_off(worst) if worst and worst.off.moves else ""
+            rows.append(ListRow("caution", tr(text, names=named), off, f"#{place}"))
+    return rows
 
 
 def known_alone(evidence: TableEvidence) -> int:

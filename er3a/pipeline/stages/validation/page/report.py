@@ -155,7 +155,7 @@ def _both_arms(
 ) -> Markup:
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
     scale."""
-    arms = [seen_arm(robot, own_title(robot.title), tr("this table"), "right")]
+    arms = [seen_arm(robot, tr("This table"), "", "right")]
     if other is not None:
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
     off = flanges_off(arms)
@@ -201,18 +201,26 @@ def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[t
             kind: LabelKind = "right" if stated.met else "open"
             text = joined([with_unit(fixed(stated.expected, 1), each.unit), own_title(stated.document)], ": ")
             labels.append(Label(text, np.array([0.0, -step * row]), kind, written_there=True))
-            lines += dimension(stated.expected, -step * (row + 0.5), -1.5 * step, kind)
+            lines += dimension(stated.expected, -step * (row + 0.5), 0.0, kind)[:1]
     return labels, lines
 
 
+def _apart(disputed: model.Conflict) -> str:
+    """By how much documents contradict each other about a reach."""
+    values = [stated.expected for stated in disputed.statements]
+    return tr("{far} apart", far=with_unit(fixed(max(values) - min(values), 1), disputed.unit))
+
+
 def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
-    """The lengths of the table, and the angles that evidence leaves open, each at the link or joint that it is of."""
+    """The lengths that evidence contradicts most, and the angles that it leaves open, each at the link or joint that it
+    is of; what is settled is in the table."""
     places, found = entry_places(robot), []
+    worst = [row.name for row in evidence.get("first", ())]
     for joint, cells in evidence.get("rows", ()):
         for cell in filter(None, cells):
-            entry, given = cell["entry"], cell["gives"] or cell["value"] != "0"
+            entry = cell["entry"]
             angle = column_of(entry) in ANGLES
-            if cell["status"] == "open" if angle else column_of(entry) in ("a", "d") and given:
+            if cell["status"] == "open" if angle else column_of(entry) in ("a", "d") and entry in worst:
                 kind, gives = _kind(cell["status"]), cell["gives"]
                 text = joined([f"{entry} = {cell['value']}", gives], " → " if kind == "wrong" else " / ")
                 text = with_unit(text, "deg" if angle else "mm")
@@ -239,7 +247,9 @@ def _answer(
         count, what = (bad, tr("entries contradicted")) if bad else (alone - unsure, tr("entries settled by them"))
         keys.append((f"{count}/{alone}", what))
         if unsure and not bad:
-            below = tr("A check that other values would pass as well settles no entry.")
+            below = tr("{count} entries could be wrong and pass all the same.", count=unsure)
+    if disputed:
+        keys[0] = _apart(disputed[0]), say(disputed[0].subject)
     if instead:
         fix = Fix(
             tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),

@@ -22,15 +22,14 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
 from er3a.pipeline.viewing.figures import bars, new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
     panel_link,
     render_stage,
 )
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, MUTED
-from er3a.robots.robot import Robot
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 
 MAX_IMAGES = 9
 WIDEST_PX = 480
@@ -108,11 +107,12 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
 
 def error_picture(each: model.ObjectResult, task: VisionFile) -> Picture:
     """By how much the tool misses an object, by cause, and what the gripper tolerates."""
-    allowed = min(task.gripper.tolerance_mm), min(task.gripper.tolerance_deg)
-    sizes = [*((getattr(each.error_mm, part), getattr(each.error_deg, part)) for part in PARTS), allowed]
-    names = [*(word("vision.part_of_error", PARTS, part) for part in PARTS), tr("gripper's tolerance")]
+    sizes = [(getattr(each.error_mm, part), getattr(each.error_deg, part)) for part in PARTS]
+    names = [word("vision.part_of_error", PARTS, part) for part in PARTS]
     texts = [f"{fixed(mm, 2)} mm, {fixed(deg, 2)}°" for mm, deg in sizes]
-    figure, ax = bars(names, np.array(sizes)[:, 0], texts, [*[MODEL] * len(PARTS), MUTED])
+    figure, ax = bars(names, np.array(sizes)[:, 0], texts, [MODEL] * len(PARTS))
+    ax.axvline(min(task.gripper.tolerance_mm), color=HIGHLIGHT, label=tr("gripper's tolerance"))
+    ax.legend(loc="lower right", bbox_to_anchor=(1, 1))
     ax.set_xlabel(tr("error (mm)"))
     caption = tr("What 95 % of errors stay below, by cause.")
     return Picture(figure, caption, caption)
@@ -138,7 +138,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         study,
         stored,
         output,
-        _answer(robot, results),
+        _answer(results, task),
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
@@ -159,13 +159,13 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     )
 
 
-def _answer(robot: Robot, results: model.VisionResults) -> Answer:
+def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
     """How many objects can be grasped, what that leaves open, and how well the camera's place is known."""
     summary = results.summary
     grasped = [each for each in summary.objects if each.grasp]
     caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
     due, found = len(summary.objects) - len(caught), summary.calibration
-    headline = tr("{count} of {due} reachable.", count=len(grasped), due=due)
+    headline = tr("{count} of {due} can be grasped.", count=len(grasped), due=due)
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
     rest = all_caught(len(caught))
@@ -173,24 +173,26 @@ def _answer(robot: Robot, results: model.VisionResults) -> Answer:
         headline, rest = joined([headline, rest], " "), ""
     keys = []
     if off := [each.error_mm.together for each in grasped if each.error_mm]:
-        keys = [(with_unit(fixed(max(off), 1), "mm"), tr("error at the grasp, 95 %"))]
+        made = (
+            tr("error at the grasp, 95 %, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
+        )
+        allowed = with_unit(f"{min(task.gripper.tolerance_mm):g}", "mm")
+        keys = [(tr("{value} of {limit}", value=fixed(max(off), 1), limit=allowed), made)]
     elif found:
         half = max(found.hand_eye.half_width_mm)
         keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [
-        Group(tr("Not reachable"), [row for row in shown if row.mark == "fail"]),
-        Group(tr("Reachable"), [row for row in shown if row.mark == "pass"]),
+        Group(tr("Can't be grasped"), [row for row in shown if row.mark == "fail"]),
+        Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
     if found and (found.suspects or found.warnings):
         rows = [ListRow("caution", each.sample, _why_left_out(each), "#samples") for each in found.suspects]
         rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
-    wrist = robot.masses.wrist
-    unrated = bool(summary.objects) and (wrist is None or not np.isfinite(wrist.payload))
-    below = [tr("Payload unknown.")] if unrated else []
-    below += [tr("The camera is simulated.")] if found and found.simulated else []
-    return Answer(headline, rest, joined(below, " "), keys, groups)
+    gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
+    text = tr("give the tool a shape: “carried” in the scene's file.")
+    return Answer(headline, rest, "", keys, groups, Fix(text, "#verdict", False) if "gripper" in gaps else None)
 
 
 def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
@@ -198,8 +200,8 @@ def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
     if each.grasp is None:
         return ListRow("fail", each.name, refusal_text(each), f"#{each.name}", moment)
     sure = each.grasp.probability
-    note = tr("success: {percent} %", percent=fixed(100 * sure, 1))
-    return ListRow("pass", each.name, note, f"#{each.name}", moment, 1.0, [Part(sure, 1.0, "rest")])
+    note = tr("{percent} % succeed", percent=fixed(100 * sure, 1))
+    return ListRow("pass", each.name, note, f"#{each.name}", moment)
 
 
 def _why_left_out(found: Finding) -> str:

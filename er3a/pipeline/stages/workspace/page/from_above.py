@@ -16,10 +16,9 @@ from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import outlines
 from er3a.robots.robot import Robot
 
-AROUND = 1.2  # of the reach, that is shown to each side
+AROUND = 1.1  # of the reach, that is shown to each side
 DEAD = 0.2  # rad that axis 1 does not turn to: there is room for a word
 LETTER = 0.3  # half the width of a letter, of its height
-FINE = 0.1  # of the reach: letters below this leave room for the limits of joint 1
 BASE = 0.06  # of the reach: radius of the dot at axis 1
 
 
@@ -60,9 +59,6 @@ def from_above(
     if gap > DEAD:
         parts.append(Markup('<path class="dead" id="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
         words.append(_word(0.85 * reach * _way(high + gap / 2), height, tr("dead zone"), "", size))
-        for limit, aside in ((low, height), (high, -height)) if letters < FINE else ():
-            named = f"J1 {fixed(np.degrees(limit), 0)}°"
-            words.append(_word(1.08 * reach * _way(limit + aside / reach), height, named, "", size))
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))

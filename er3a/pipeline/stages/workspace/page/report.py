@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from markupsafe import Markup
 from er3a.collision.scene import Scene
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
-from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
+from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
@@ -22,7 +23,7 @@ from er3a.pipeline.stages.workspace.page.capability_section import capability_co
 from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow
 from er3a.pipeline.viewing.page import Picture, render_stage, whole_sentence
 from er3a.pipeline.viewing.side_view import Kind
 from er3a.robots.robot import Robot
@@ -47,8 +48,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         study,
         stored,
         output,
-        _answer(summary, placing, payload_key(known, robot)),
-        at_side=placing,  # the plan of the tray
+        _answer(summary, placing, [] if known else [payload_key(known, robot)]),
         plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
         labelled=_labelled(robot, results, scene, "wrong" if contradicted else "right"),
         turning=workspace_figures.in_space(robot, results, scene, placing.tray if placing else None),
@@ -67,40 +67,45 @@ def _labelled(robot: Robot, results: model.WorkspaceResults, scene: Scene | None
     return workspace_figures.labelled(robot, results, floor_mm, kind)
 
 
-def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str]) -> Answer:
-    """How far the arm reaches, its voids, where the tray goes, and the ``payload``."""
+def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: Sequence[tuple[str, str]]) -> Answer:
+    """How far the arm reaches, its voids, where the tray goes, and the ``payload`` where no other page says it."""
     reach, volume = summary.reach_m, summary.volume_m3
-    rest, best = "", placing.tried[0] if placing else None
+    rest, fix, best = "", None, placing.tried[0] if placing else None
     if placing and best and not sum(map(len, placing.hindered(best).values())):
-        rest = whole_sentence(tr("{tray} fits", tray=best.tray.name))
+        rest, centre = whole_sentence(tr("{tray} fits", tray=best.tray.name)), millimetres(best.tray.place.centre_m)
+        fix = Fix(tr("put it into the scene at {centre} mm, with its stand.", centre=centre), "#placement", False)
     keys = [
         (
             tr("{low} to {high} mm", low=millimetres([reach.lowest]), high=millimetres([reach.highest])),
-            tr("its height along axis 1"),
+            tr("height along axis 1"),
         ),
         (
             with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
             tr("± {half} m³, proven", half=fixed((volume.upper - volume.lower) / 2, 2)),
         ),
-        payload,
+        *payload,
     ]
     # The void that the picture shows comes first.
-    voids = sorted(enumerate(summary.voids, start=1), key=lambda each: each[1].kind != "enclosed")
+    voids = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     groups = (
-        Group(tr("Voids"), [_void_as_row(*each, bool(placing)) for each in voids]),
         Group(tr("Where the tray goes"), _tray_as_rows(placing)),
+        Group(tr("Voids"), [_void_as_row(*each, bool(placing)) for each in voids]),
     )
-    return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups)
+    return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups, fix)
 
 
 def _void_as_row(number_: int, void: model.VoidSummary, planned: bool) -> ListRow:
     """A void: what kind, how large; ``planned``: whether there is a view from above."""
-    size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
+    size = workspace_figures.litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
+    note = with_unit(size, "L")
     of_one = {joint for limit in void.cause.params.get("limits", ()) for joint in limit.joints} == {1}
-    where = tr("at the shoulder: normal") if void.holds_shoulder else tr("in the dead zone") if of_one else ""
-    note = joined([with_unit(size, "L"), where], ", ")
+    name = tr(workspace_figures.VOID_NAMES[void.kind], number=number_)
+    if void.holds_shoulder:
+        name, note = tr("at the shoulder"), tr("{size}: normal", size=note)
+    elif of_one:
+        name = tr("in the dead zone")
     address = f"#hole-{number_}" if void.kind == "enclosed" else "#dead" if of_one and planned else f"#void-{number_}"
-    return ListRow("none", tr(workspace_figures.VOID_NAMES[void.kind], number=number_), note, address)
+    return ListRow("none", name, note, address)
 
 
 def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
@@ -134,15 +139,10 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     return [
         str(row),
         tr(workspace_figures.VOID_NAMES[void.kind], number=row),
-        _litres(low, high),
+        workspace_figures.litres(low, high),
         *map(millimetres, (void.centroid_m, void.low_m, void.high_m)),
         say(void.cause),
     ]
-
-
-def _litres(low: float, high: float) -> str:
-    """Bounds of a volume in litres, rounded outwards."""
-    return tr("{low} to {high}", low=at_least(low, "L"), high=at_most(high, "L"))
 
 
 def _section_caption(summary: model.WorkspaceSummary) -> str:

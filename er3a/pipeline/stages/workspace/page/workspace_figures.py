@@ -18,7 +18,7 @@ from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_, own_title, tr
-from er3a.pipeline.messages.numbers import at_least, fixed, number
+from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.workspace import reaches
 from er3a.pipeline.player.turning import ColourScale, Layer, Solids, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
@@ -231,10 +231,14 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
     return side_view([seen], floor_mm, ratio=1.2, labels=labels, over=over)
 
 
+def litres(low: float, high: float) -> str:
+    """Bounds of a volume in litres, rounded outwards."""
+    return tr("{low} to {high}", low=at_least(low, "L"), high=at_most(high, "L"))
+
+
 def void_label(number_: int, void: model.VoidSummary) -> Label:
     """The name of a void, at its place."""
-    size = at_least(1000 * void.volume_m3.lower, "L")
-    name = tr("void, {size} L", size=size)
+    name = tr("void, {size} L", size=litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper))
     low, high = void.low_m[0], void.high_m[0]
     across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
     return Label(name, 1000 * np.array([across, void.centroid_m[2]]), "hole", f"hole-{number_}")
