@@ -63,18 +63,7 @@ VERDICT_WORDS = {
     "not_computed": N_("not computed"),
 }
 
-PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("teach panel")}
-SHORT_NAMES = {
-    "validation": N_("D-H table"),
-    "workspace": N_("Reach"),
-    "collision": N_("Collisions"),
-    "inverse": N_("Poses"),
-    "trajectory": N_("Paths"),
-    "programs": N_("Programs"),
-    "dynamics": N_("Torque"),
-    "vision": N_("Camera"),
-    "teach": N_("Teach panel"),
-}
+PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("Teach panel")}
 FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's header
     "pass": N_("D-H table confirmed"),
     "fail": N_("D-H table contradicted"),
@@ -352,7 +341,6 @@ def render(
             terms=glossary(),
             verdict_words=VERDICT_WORDS,
             pages=PAGES,
-            short_names=SHORT_NAMES,
             at_side=bool(context.pop("at_side", False)),
             language=language.current(),
             summary=summary,
