@@ -201,8 +201,8 @@ function tell() {
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : motion.text;
-  const text = now.filter(({ status }) => status === now[0].status).map((event) => event.text).join(words.between) || ends;
-  show(nowShown, text);
+  const gravest = now.filter(({ status }) => status === now[0].status); // the first fault of these is the cause; of lines the last is carried out
+  show(nowShown, gravest.at(now[0]?.status === "plain" ? -1 : 0)?.text || ends);
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
@@ -260,7 +260,7 @@ function newMotion() {
     const tick = document.createElement("button");
     const at = (value) => Math.min(100, (100 * (value - start())) / (whole() - start() || 1));
     Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
-    tick.style.left = `${at(event.t)}%`;
+    tick.style.left = `min(${at(event.t)}%, 100% - 0.3rem)`; // what is at the end is seen too
     tick.style.width = `${Math.max(0, at(event.until) - at(event.t))}%`;
     tick.addEventListener("click", () => goTo(null, event.t));
     return tick;

@@ -91,7 +91,25 @@ def nearness_picture(
     ax.set_xlim(0.0, rows.t_s[-1])
     ax.set_xlabel(axis_label(rows, "t_s"))
     ax.set_ylabel(axis_label(rows, "clearance_mm"))
-    return Picture(figure, tr("{path}: how near it comes", path=name), caption, [(ax, name)])
+    return Picture(figure, tr("Clearance"), caption, [(ax, name)])
+
+
+def fault_picture(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> Picture:
+    """What fails on a path that meets nothing, over its time: its distances from singular poses, or where it meets none
+    and is too fast, the speed of its fastest joint in parts of the limit; below or above the dashed line it fails."""
+    figure, ax = new_figure(width=5.2, height=2.6)
+    if path.too_fast and path.verdict != "singular" and not path.unreachable:
+        title = tr("Joint speed")
+        ax.plot(rows.t_s, rows.speed_ratio, color=palette.MODEL, linewidth=2.2)
+        ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
+        ax.set_ylabel(tr("speed / limit"))
+    else:
+        title = tr("Distance from singular poses")
+        _distances(ax, rows, near)
+    _mark(ax, path)
+    ax.set_xlim(0.0, rows.t_s[-1])
+    ax.set_xlabel(axis_label(rows, "t_s"))
+    return Picture(figure, title, "", [(ax, path.name)])
 
 
 def _axes(figure: Figure, row: int) -> Axes:
@@ -177,7 +195,7 @@ def _shades(path: model.PathSummary) -> list[tuple[tuple[model.Stretch, ...], st
     """Stretches that are wrong, with the colour, opacity and name of their shade."""
     shades = [
         (path.out_of_limits, palette.VERDICTS["caution"], 0.16, tr("outside a joint limit")),
-        (path.too_fast, palette.VERDICTS["fail"], 0.14, tr("joint too fast")),
+        (path.too_fast, palette.VERDICTS["fail" if path.fails else "caution"], 0.14, tr("joint too fast")),
         (path.unreachable, palette.INK, 0.14, tr("not reachable")),
         (path.collisions, palette.VERDICTS["fail"], 0.3, tr("collision")),
     ]

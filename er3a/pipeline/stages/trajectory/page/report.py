@@ -27,7 +27,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
-from er3a.pipeline.stages.trajectory.page.path_figures import nearness_picture, path_picture
+from er3a.pipeline.stages.trajectory.page.path_figures import fault_picture, nearness_picture, path_picture
 from er3a.pipeline.stages.trajectory.page.played import (
     faults,
     motions,
@@ -209,15 +209,19 @@ def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks, near:
 
 
 def _nearness(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:
-    """Of a path, and of the motion that repairs it: its name, and how near it comes over time."""
+    """Of a path, and of the motion that repairs it: its name, and over time what fails, or else how near it comes."""
     rows, shapes = results.clearance.take(results.clearance.path == path.name), results.summary.verdict.shapes
     motion = path.chosen and path.chosen.motion
     shown = [(path.name, "", path.clearance, path), (repaired(path), path.strategy, motion and motion.clearance, None)]
-    return [
-        (name, nearness_picture(name, least, rows.take(rows.strategy == strategy), shapes, faulty))
+    drawn = {
+        name: nearness_picture(name, least, rows.take(rows.strategy == strategy), shapes, faulty)
         for name, strategy, least, faulty in shown
         if least
-    ]
+    }
+    if path.verdict != "safe" and not path.collisions and (path.too_fast or path.singularities):
+        checks = results.checks.take(results.checks.path == path.name)
+        drawn[path.name] = fault_picture(path, _drawn(path, checks), results.summary.near)
+    return list(drawn.items())
 
 
 def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
