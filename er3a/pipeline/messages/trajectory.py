@@ -99,7 +99,7 @@ TEXTS = texts(
             "[It begins at other joint angles ({changes:, }): the way there was not checked][The move to the other "
             "solution is part of it and was checked{changes:!}]"
         ),
-        "advice.time": "[{takes:.2f} s instead of {programmed:.2f} s][same time{takes:!}]",
+        "advice.time": "[{takes:.2f} s, not {programmed:.2f} s][same time{takes:!}]",
     }
 )
 

@@ -260,7 +260,7 @@ function newMotion() {
     const tick = document.createElement("button");
     const at = (value) => Math.min(100, (100 * (value - start())) / (whole() - start() || 1));
     Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
-    tick.style.left = `min(${at(event.t)}%, 100% - 0.3rem)`; // what is at the end is seen too
+    tick.style.left = `min(${at(event.t)}%, 100% - 0.6rem)`; // what is at the end is seen too
     tick.style.width = `${Math.max(0, at(event.until) - at(event.t))}%`;
     tick.addEventListener("click", () => goTo(null, event.t));
     return tick;

@@ -32,16 +32,17 @@ export class SolutionList {
     this.rows = rows;
     this.buttons = [];
     const items = [];
+    const branches = []; // of each its first row: whole turns change nothing
     for (const slot of [0, 1, 2, 3, 4, 5, 6, 7, null]) {
       const turns = rows.filter((row) => row.slot === slot);
-      if (turns.length) items.push(this.#branch(turns));
+      if (turns.length) items.push(this.#branch(turns)) && branches.push(turns[0]);
       const fault = unsolved.find((branch) => branch.slot === slot);
       if (fault) items.push(this.#missing(fault));
     }
     byId("branches").replaceChildren(...items);
-    const within = rows.filter((row) => row.withinLimits);
+    const within = branches.filter((row) => row.withinLimits);
     const colliding = within.filter((row) => row.overlap).length;
-    write(byId("count"), fill(colliding ? words.count_colliding : words.count, { within: within.length, total: rows.length, colliding }));
+    write(byId("count"), fill(colliding ? words.count_colliding : words.count, { within: within.length, total: branches.length, colliding }));
     write(byId("free"), free.map((kind) => words.free[kind]).join(" "));
     this.ghost(null);
     this.mark(q);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -25,7 +26,7 @@ from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
 from er3a.pipeline.viewing.page import render_stage
 from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
@@ -57,14 +58,16 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     robot = study.robot(name)
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
-    worst = next(((found.name, found.t_s) for found in closest if found.t_s is not None), None)
+    inside = results.paths.take(results.paths.clearance_mm < 0)
+    firsts = {name: t for name, t in zip(inside.path[::-1].tolist(), inside.t_s[::-1].tolist())}
+    worst = next(((found.name, firsts.get(found.name, found.t_s)) for found in closest if found.t_s is not None), None)
     # A path of which a part can't be reached is clear of nothing.
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
     render_stage(
         study,
         stored,
         output,
-        _answer(summary, closest, unreached, _advice(stored.folder)),
+        _answer(summary, closest, unreached, firsts, _advice(stored.folder)),
         matrix=_matrix(robot, results.matrix),
         never_met=int((results.matrix.state == "never").sum()),
         tried=TRIED,
@@ -85,17 +88,20 @@ def _answer(
     summary: model.CollisionSummary,
     closest: Sequence[model.Closest],
     unreached: set[str],
+    firsts: Mapping[str, float],
     advice: Mapping[str, Fix],
 ) -> Answer:
     """How many paths and chosen solutions are clear of everything, and how near each comes.
 
     What collides as its file expects is named, and so is a path of which only a part was measured: that is clear of
-    nothing. ``unreached``: these; ``advice``: what may be run instead of a path, by its name.
+    nothing. ``unreached``: these; ``firsts``: when (s) paths first touch something, and ``advice``: what may be run
+    instead of a path, by their names.
     """
     params = summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
     most = max((each.clearance_mm for each in closest), default=1.0)
-    rows = [_row(each, unreached, near, advice, most) for each in closest]
+    deepest = min((each.clearance_mm for each in closest if each.clearance_mm < 0), default=0.0)
+    rows = [_row(each, unreached, near, firsts, advice, (deepest, most)) for each in closest]
     hit, clear, partly = (
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
@@ -141,22 +147,26 @@ def _row(
     found: model.Closest,
     unreached: set[str],
     near: Sequence[str],
+    firsts: Mapping[str, float],
     advice: Mapping[str, Fix],
-    most_mm: float,
+    ends_mm: tuple[float, float],
 ) -> ListRow:
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
     which only a part was measured.
 
-    The bar is the clearance in parts of ``most_mm``."""
+    The bar is the clearance between ``ends_mm``, from 0 to the right, and where it overlaps to the left."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     of_path = found.kind == "path"
-    mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
+    mark: Literal["pass", "caution", "fail", "none"] = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     if of_path and found.name in unreached and mark != "fail":
         mark = "none"
-    bar = [Part(0.0, 1.0, mark)] if mark == "none" else []
+    low, high = ends_mm
+    zero, end = (max(0.0, (value - low) / (high - low)) for value in (0.0, found.clearance_mm))
+    left, right = min(zero, end), max(zero, end)
+    bar = [Part(0.0, left, "rest"), Part(right, 1.0, "rest"), Part(left, right, mark)]
     fix = advice.get(found.name) if mark == "fail" and of_path else None
-    length = max(0.0, found.clearance_mm) / most_mm
-    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, bar, fix)
+    seen = firsts.get(found.name, found.t_s) if of_path else None
+    return ListRow(mark, found.name, note, "", (found.name, seen or 0.0), 1.0, bar, fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

@@ -110,10 +110,19 @@ def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
 def worst_first(results: ProgramsResults) -> list[ProgramSummary]:
     """Programs with what was found: those that fail first, of them those that were not expected to."""
     programs = [
-        replace(program, findings=tuple(_of_passes(results, program, each) for each in program.findings))
+        replace(program, findings=tuple(_seen(results, program, each) for each in program.findings))
         for program in results.summary.programs
     ]
     return sorted(programs, key=lambda each: (-RANKS[each.outcome], is_met(each)))
+
+
+def _seen(results: ProgramsResults, program: ProgramSummary, found: FindingAt) -> FindingAt:
+    """A finding as the page shows it; what is about a line as a whole is seen where the last line up to it ends."""
+    rows = results.motion.take(results.motion.program == program.name)
+    ends = [t1 for line, _, _, t1 in stretches(rows) if line <= found.line and found in of_line(program, found.line)]
+    shown = _of_passes(results, program, found)
+    unseen = found.motion_s is None and found.program_s is None
+    return replace(shown, program_s=max(ends)) if unseen and ends else shown
 
 
 def _of_passes(results: ProgramsResults, program: ProgramSummary, found: FindingAt) -> FindingAt:
