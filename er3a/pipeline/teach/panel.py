@@ -157,7 +157,7 @@ WORDS: dict[str, Any] = {
     "current": N_("the arm is here"),
     "within": N_("within the limits"),
     "within_at": N_("within the limits, {joints} at the limit"),
-    "leaves": N_("outside: {reasons}"),
+    "leaves": N_("{joint} {excess} over its limit"),
     "separator": N_("; "),
     "above": N_("{joint} at {angle} is {excess} above its limit of {limit}"),
     "below": N_("{joint} at {angle} is {excess} below its limit of {limit}"),

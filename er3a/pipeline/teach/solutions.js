@@ -108,8 +108,10 @@ export class SolutionList {
     const { words } = this.data;
     const at = this.#atLimit(row).join(", ");
     if (row.withinLimits && at) return fill(words.within_at, { joints: at });
-    const [first, ...more] = beyondLimits(this.data, row.q); // the rest is said when it is asked for
-    return row.withinLimits ? words.within : fill(words.leaves, { reasons: first }) + (more.length ? ` (+${more.length})` : "");
+    if (row.withinLimits) return words.within;
+    const [beyond] = excesses(this.data.table, row.q); // all of it is said when it is asked for
+    const { name, text } = limited(this.data, beyond);
+    return fill(words.leaves, { joint: name, excess: text(beyond.excess, 0) });
   }
 
   #button(row, parts) {

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator
 
 from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
@@ -145,22 +145,13 @@ def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> 
         ratio = np.maximum(np.abs(distance) / threshold, 1e-4)
         ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=singularity_word(kind))
     ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
-    _logarithmic(ax, 0.01, 100.0)
+    ax.set_yscale("log")  # with ticks of its own: matplotlib's take longer than all curves
+    ax.set(ylim=(0.01, 100.0), yticks=[0.01, 0.1, 1, 10, 100], yticklabels=["0.01", "0.1", "1", "10", "100"])
+    ax.minorticks_off()
     ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
     legend = ax.legend(loc="lower left", ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
     legend.set_frame_on(True)  # a ground of its own, where a curve passes behind it
     legend.get_frame().set(facecolor="white", edgecolor="none", alpha=0.85)
-
-
-def _logarithmic(ax: Axes, low: float, high: float) -> None:
-    """A logarithmic axis with plain numbers at powers of ten: matplotlib's own ticks take longer than all curves."""
-    ax.set_yscale("log")
-    ax.set_ylim(low, high)
-    decades = np.arange(np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9) + 1)
-    ticks = 10.0 ** (decades if len(decades) < 6 else decades[::2])
-    ax.yaxis.set_minor_locator(NullLocator())
-    ax.yaxis.set_major_locator(FixedLocator(ticks.tolist()))
-    ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
 
 
 def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
