@@ -151,9 +151,7 @@ WORDS: dict[str, Any] = {
     "previous": N_("Previous"),
     "next": N_("Next"),
     "count": N_("{within} of {total} within the limits"),
-    "count_colliding": N_(
-        "{within} of {total} within the limits, of these {colliding} in collision"
-    ),
+    "count_colliding": N_("{within} of {total} within the limits, of these {colliding} in collision"),
     "current": N_("the arm is here"),
     "within": N_("within the limits"),
     "within_at": N_("within the limits, {joints} at the limit"),

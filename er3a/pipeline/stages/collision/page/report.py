@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -26,7 +25,7 @@ from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, all_caught
 from er3a.pipeline.viewing.page import render_stage
 from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
@@ -59,7 +58,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
     inside = results.paths.take(results.paths.clearance_mm < 0)
-    firsts = {name: t for name, t in zip(inside.path[::-1].tolist(), inside.t_s[::-1].tolist())}
+    firsts = dict(zip(inside.path[::-1].tolist(), inside.t_s[::-1].tolist()))
     worst = next(((found.name, firsts.get(found.name, found.t_s)) for found in closest if found.t_s is not None), None)
     # A path of which a part can't be reached is clear of nothing.
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
@@ -100,8 +99,7 @@ def _answer(
     params = summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
     most = max((each.clearance_mm for each in closest), default=1.0)
-    deepest = min((each.clearance_mm for each in closest if each.clearance_mm < 0), default=0.0)
-    rows = [_row(each, unreached, near, firsts, advice, (deepest, most)) for each in closest]
+    rows = [_row(each, unreached, near, firsts, advice, most) for each in closest]
     hit, clear, partly = (
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
@@ -149,24 +147,22 @@ def _row(
     near: Sequence[str],
     firsts: Mapping[str, float],
     advice: Mapping[str, Fix],
-    ends_mm: tuple[float, float],
+    most_mm: float,
 ) -> ListRow:
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
     which only a part was measured.
 
-    The bar is the clearance between ``ends_mm``, from 0 to the right, and where it overlaps to the left."""
+    The bar is the clearance in parts of ``most_mm``."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     of_path = found.kind == "path"
-    mark: Literal["pass", "caution", "fail", "none"] = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
+    mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     if of_path and found.name in unreached and mark != "fail":
         mark = "none"
-    low, high = ends_mm
-    zero, end = (max(0.0, (value - low) / (high - low)) for value in (0.0, found.clearance_mm))
-    left, right = min(zero, end), max(zero, end)
-    bar = [Part(0.0, left, "rest"), Part(right, 1.0, "rest"), Part(left, right, mark)]
+    bar = [Part(0.0, 1.0, mark)] if mark == "none" else []
     fix = advice.get(found.name) if mark == "fail" and of_path else None
+    length = max(0.0, found.clearance_mm) / most_mm
     seen = firsts.get(found.name, found.t_s) if of_path else None
-    return ListRow(mark, found.name, note, "", (found.name, seen or 0.0), 1.0, bar, fix)
+    return ListRow(mark, found.name, note, "", (found.name, seen or 0.0), length, bar, fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

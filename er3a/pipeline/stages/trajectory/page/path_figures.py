@@ -161,14 +161,9 @@ def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
     low, high = np.nanmin(q_deg, axis=0), np.nanmax(q_deg, axis=0)
     lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
     for j in np.flatnonzero(~robot.continuous):
-        for limit, gap, side in ((lower[j], low[j] - lower[j], "top"), (upper[j], upper[j] - high[j], "bottom")):
+        for limit, gap in ((lower[j], low[j] - lower[j]), (upper[j], upper[j] - high[j])):
             if gap < NEAR_LIMIT_DEG:
                 ax.axhline(limit, color=palette.JOINTS[j], linestyle="--", linewidth=1)
-                text = tr("limit of {joint}", joint=palette.JOINT_NAMES[j])
-                ax.text(
-                    0.01, limit, text, transform=ax.get_yaxis_transform(), va=side, fontsize=8, color=palette.JOINTS[j]
-                )
-                ax.margins(y=0.18)
 
 
 def _cut(ax: Axes, values: Reals) -> None:

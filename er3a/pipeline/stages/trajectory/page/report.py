@@ -254,7 +254,8 @@ def strategies_shown(path: model.PathSummary) -> list[list[str]]:
         if tried.motion is None:
             rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
         else:
-            rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
+            remark = tr("not usable: {reason}", reason=reasons(tried)) if tried.reasons else ""
+            rows.append([name, *_costs(tried.motion), remark])
     return rows
 
 
@@ -271,14 +272,6 @@ def _costs(motion: model.StrategyMotion) -> list[str]:
 
 def _clearance(found: model.MinClearance | None) -> str:
     return bracketed(fixed(found.least_mm, 0), say(found.between)) if found else "–"
-
-
-def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:
-    if tried.reasons:
-        return tr("not usable: {reason}", reason=reasons(tried))
-    if tried.name == "detour":
-        return tr("joint moves are unaffected by singularities")
-    return tr("keeps its distance from singular poses") if motion.keeps_clear else tr("goes through the region")
 
 
 def _ratio(value: float | None) -> str:
