@@ -59,14 +59,14 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
     inside = results.paths.take(results.paths.clearance_mm < 0)
     firsts = dict(zip(inside.path[::-1].tolist(), inside.t_s[::-1].tolist()))
-    worst = next(((found.name, firsts.get(found.name, found.t_s)) for found in closest if found.t_s is not None), None)
     # A path of which a part can't be reached is clear of nothing.
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
+    answer = _answer(summary, closest, unreached, firsts, _advice(stored.folder))
     render_stage(
         study,
         stored,
         output,
-        _answer(summary, closest, unreached, firsts, _advice(stored.folder)),
+        answer,
         matrix=_matrix(robot, results.matrix),
         never_met=int((results.matrix.state == "never").sum()),
         tried=TRIED,
@@ -75,7 +75,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
             robot,
             [*motions(robot, results), *poses(robot, results)],
             scene,
-            opened=worst,
+            opened=next((group.rows[0].play for group in answer.shown_groups), None),
         ),
         drawing_head=drawing_head(),
         home=_angles(robot, np.array(summary.home_deg or ())),

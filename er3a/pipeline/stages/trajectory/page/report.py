@@ -177,7 +177,6 @@ def _section(
         distance=_clear_of(path),
         near=near is not None,
         branches=[branch_word(label) for label in path.branches],
-        speed=_speed(path, summary.joint_limits),
         strategies=strategies_shown(path),
         programs=[each for each in programs if not _repairs(path, each)],
         repaired=[each for each in programs if _repairs(path, each)],
@@ -278,13 +277,3 @@ def _ratio(value: float | None) -> str:
     if value is None:
         return tr("no bound")
     return f"> {FAR:g}" if value > FAR else fixed(value, 2)
-
-
-def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
-    """The speed of the joint that comes nearest to its limit."""
-    speeds = path.max_joint_speed_deg_s
-    if not speeds:
-        return "–" if not path.joint_speed_bounded and path.verdict == "unreachable" else tr("unbounded")
-    joint = max(range(len(speeds)), key=lambda j: speeds[j] / limits.speed_deg_s[j])
-    unit = " mm/s" if joint + 1 in path.sliding else ""
-    return f"{fixed(speeds[joint], 1)}{unit} (J{joint + 1})"
