@@ -221,7 +221,7 @@ def test_every_solution_keeps_the_tool_in_place(panel):
     robot = load_robot("er3a_c60")
     start = [30, -20, 15, 40, 60, 10]
     panel.move(*start)
-    panel.until(lambda: panel.text("#count") == "4 of 6 within the limits, further turns counted")
+    panel.until(lambda: panel.text("#count") == "3 of 4 within the limits")
     T = forward(robot, np.radians(start))
     visited = []
     for _ in range(4):
@@ -234,7 +234,7 @@ def test_every_solution_keeps_the_tool_in_place(panel):
     assert len({tuple(np.round(q, 6)) for q in visited}) == 4
     assert visited[-1] == pytest.approx(start)
     outside = panel.one('.solution[aria-disabled="true"]')
-    assert re.search(r"J3 at 138\.\d° is \d+\.\d° above its limit of 105°", outside.text)
+    assert re.search(r"J3 \d+° over its limit", outside.text)
     panel.browser.execute_script("arguments[0].click()", outside)
     assert panel.joints() == pytest.approx(start)
     assert re.search(r"The arm does not move: .*J3 at 138\.\d° is \d+\.\d° above", panel.text("#refused"))

@@ -510,7 +510,7 @@ def test_where_a_repair_is_slower_is_told_with_the_least_share_of_the_speed(tmp_
     inside = (at > found.start_s) & (at < found.end_s)
     assert share[inside].min() == pytest.approx(found.part, abs=0.02)
     (fault,) = faults(results)
-    said = f"Slow down from t = {found.start_s:.2f} to {found.end_s:.2f} s, to {int(100 * found.part)} %"
+    said = f"Slow to {int(100 * found.part)} % from t = {found.start_s:.2f} to {found.end_s:.2f} s"
     assert fault.to_do.startswith(said)
     assert "Or run all of it at" in fault.to_do
     assert slowed(replace(path, strategy="branch"), rows, repair) is None

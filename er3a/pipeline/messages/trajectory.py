@@ -87,19 +87,19 @@ TEXTS = texts(
             "End it at t = {t_s:.4g} s: [{margin:.1f} mm clear after the stop][{margin:!}{left_s:.2f} s before the "
             "first fault]. It is at ({xyz_mm:.1f, }) mm then; a stop takes {stop_s:.2f} s"
         ),
-        "advice.slow_there": "Slow down from t = {start:.2f} to {end:.2f} s, to {percent} % at the slowest",
+        "advice.slow_there": "Slow to {percent} % from t = {start:.2f} to {end:.2f} s",
         "advice.no_part": "Run no part of it",
         "advice.near": "it begins near a singular pose",
         "advice.clear": "{clearance:.1f} mm clear",
         "advice.slowly": "It is quicker than the {programmed:.2f} s programmed: another motion",
         "advice.region": "It still passes near the singular pose",
-        "advice.tool": "[{far} mm, {turned}° off the path][the tool stays on the path{far:!}]",
+        "advice.tool": "[{far} mm, {turned}° off the path][stays on the path{far:!}]",
         "advice.swing": "J{joint} turns by {swing:.0f}°",
         "advice.switch": (
             "[It begins at other joint angles ({changes:, }): the way there was not checked][The move to the other "
             "solution is part of it and was checked{changes:!}]"
         ),
-        "advice.time": "[{takes:.2f} s instead of {programmed:.2f} s][same time{takes:!}]",
+        "advice.time": "[{takes:.2f} s, not {programmed:.2f} s][same time{takes:!}]",
     }
 )
 

@@ -26,7 +26,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.drawn import floor_of
-from er3a.pipeline.viewing.page import SHORT_NAMES, Head, head_of
+from er3a.pipeline.viewing.page import PAGES, Head, head_of
 from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, beyond, border_lines, seen_arm, side_view
 
 USES = ("use", "plan", "measure", "never")  # from what may be relied on most
@@ -131,7 +131,7 @@ def _entry(study: Study, name: str, stored: Results, outdated: str) -> RobotRow:
     heads, expected = {stage: head_of(each) for stage, each in stored.items()}, study.entry(name).expect
     table = heads["validation"].status if "validation" in heads else "not_examined"
     failed = [
-        tr(SHORT_NAMES.get(stage, stage))
+        tr(PAGES[stage])
         for stage, head in heads.items()
         if StageVerdict(name, stage, head.status, head.finding.code, "", expected=expected.get(stage)).counts("fail")
     ]

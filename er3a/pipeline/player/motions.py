@@ -166,12 +166,13 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0, n
     """
     seen, motion = fault.moments[0].seen_s, motion if motion and len(motion.t) > 1 else None
     parts = bar_of(motion, duration_s) if motion else []
+    gravest = [each.t for each in motion.events if each.status == "fail"] if motion else []
     return ListRow(
         "fail" if fault.status == "fail" else "caution",
         fault.name,
         note or fault.verdict,
         f"#{fault.name}",
-        (fault.name, seen or 0.0) if motion else None,
+        (fault.name, min(gravest, default=seen or 0.0)) if motion else None,
         float(bool(parts)),
         parts,
         fix_of([fault]),
@@ -188,7 +189,7 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
     """What to do about the first fault that can be mended; None where none can."""
     for fault in faults:
         if fault.to_do:
-            place = fault.instead[1] if fault.instead else fault.address
+            place = fault.instead[1] if fault.instead else ""  # the row itself leads to what is wrong
             text = re.sub(r"(?<=\d) (?=(mm|s|%))", "\u00a0", first_sentence(fault.to_do)[0])  # units stay with values
             return Fix(text, place, fault.status != "caution")
     return None

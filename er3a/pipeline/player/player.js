@@ -23,7 +23,7 @@ const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, nowShown] = ["arm", "motion", "time", "clock", "now-shown"].map(part);
-const unjudged = document.querySelector(".runs .no_verdict") && { events: [], marks: [], text: words.not_judged }; // of a wrong table
+const unjudged = document.querySelector(".answer .no_verdict") && { events: [], marks: [], text: words.not_judged }; // of a wrong table
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const floor = data.floor ?? column(table.base, 3)[2];
 
@@ -133,7 +133,8 @@ function draw() {
     const origin = column(T, 3);
     for (const c of [0, 1, 2]) space.line([origin, add(origin, scaled(column(T, c), 0.09 * data.size))], data.axes[c], 3);
   }
-  for (const j of new Set(now.flatMap(({ axes }) => axes))) singularAxis(j, poses[0][j]);
+  const worst = GRAVEST.find((status) => now.some((event) => event.status === status)); // what comes with it is not named
+  for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j]);
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
@@ -146,7 +147,7 @@ function draw() {
   }
   if (motion.loads) tellLoads(poses[0]);
   for (const [j, { status }] of failing()) {
-    space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
+    if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
   }
   if (arms.length === 1) nameEnds(motion.trails[0]);
   for (const { text, at } of data.signs) space.word(text, at);
@@ -201,14 +202,14 @@ function tell() {
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : motion.text;
-  const text = now.filter(({ status }) => status === now[0].status).map((event) => event.text).join(words.between) || ends;
-  show(nowShown, text);
+  const gravest = now.filter(({ status }) => status === now[0].status); // the first fault of these is the cause; of lines the last is carried out
+  show(nowShown, gravest.at(now[0]?.status === "plain" ? -1 : 0)?.text || ends);
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
   for (const part of stretches) {
     const [from, to] = [Number(part.dataset.from), Number(part.dataset.t)];
-    const now = part.dataset.play === motion.name && t >= from - 1e-9 && t <= to + 1e-9;
+    const now = part.dataset.play === motion.name && t >= from - ROUNDED && t <= to + ROUNDED;
     if (now && !part.classList.contains("now")) listed(part);
     part.classList.toggle("now", now);
   }
@@ -260,7 +261,7 @@ function newMotion() {
     const tick = document.createElement("button");
     const at = (value) => Math.min(100, (100 * (value - start())) / (whole() - start() || 1));
     Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
-    tick.style.left = `${at(event.t)}%`;
+    tick.style.left = `min(${at(event.t)}%, 100% - 0.6rem)`; // what is at the end is seen too
     tick.style.width = `${Math.max(0, at(event.until) - at(event.t))}%`;
     tick.addEventListener("click", () => goTo(null, event.t));
     return tick;

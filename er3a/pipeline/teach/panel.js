@@ -84,9 +84,7 @@ function showJoint(k) {
   if (document.activeElement !== fields[k]) fields[k].value = Number(value.toFixed(3)) + 0;
   if (table.continuous[k]) return write(rows[k].querySelector(".room"), words.endless_joint);
   const room = Math.min(q[k] - table.lower[k], table.upper[k] - q[k]);
-  const share = room / ((table.upper[k] - table.lower[k]) / 2);
   rows[k].dataset.state = room <= SLACK ? "at" : room < (table.slides[k] ? data.near.slide : data.near.limit) ? "near" : "clear";
-  rows[k].querySelector(".fill").style.width = `${100 * Math.max(0, share)}%`;
   write(rows[k].querySelector(".room"), room <= SLACK ? words.at_limit : fill(words.room, { room: inUnit(table, k, room) }));
 }
 

@@ -42,7 +42,6 @@ from er3a.robots.joint_limits import joint_names, meant
 from er3a.robots.robot import Robot
 
 WORDS: dict[str, Any] = {
-    "title": N_("teach panel"),
     "view": N_("The arm"),
     "picture": N_(
         "The arm in three dimensions at the joint angles of the sliders, each joint in its own colour. "
@@ -151,14 +150,12 @@ WORDS: dict[str, Any] = {
     "solutions": N_("All IK solutions of this pose"),
     "previous": N_("Previous"),
     "next": N_("Next"),
-    "count": N_("{within} of {total} within the limits, further turns counted"),
-    "count_colliding": N_(
-        "{within} of {total} within the limits, further turns counted, of these {colliding} in collision"
-    ),
+    "count": N_("{within} of {total} within the limits"),
+    "count_colliding": N_("{within} of {total} within the limits, of these {colliding} in collision"),
     "current": N_("the arm is here"),
     "within": N_("within the limits"),
     "within_at": N_("within the limits, {joints} at the limit"),
-    "leaves": N_("outside: {reasons}"),
+    "leaves": N_("{joint} {excess} over its limit"),
     "separator": N_("; "),
     "above": N_("{joint} at {angle} is {excess} above its limit of {limit}"),
     "below": N_("{joint} at {angle} is {excess} below its limit of {limit}"),

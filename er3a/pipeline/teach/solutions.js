@@ -32,16 +32,17 @@ export class SolutionList {
     this.rows = rows;
     this.buttons = [];
     const items = [];
+    const branches = []; // of each its first row: whole turns change nothing
     for (const slot of [0, 1, 2, 3, 4, 5, 6, 7, null]) {
       const turns = rows.filter((row) => row.slot === slot);
-      if (turns.length) items.push(this.#branch(turns));
+      if (turns.length) items.push(this.#branch(turns)) && branches.push(turns[0]);
       const fault = unsolved.find((branch) => branch.slot === slot);
       if (fault) items.push(this.#missing(fault));
     }
     byId("branches").replaceChildren(...items);
-    const within = rows.filter((row) => row.withinLimits);
+    const within = branches.filter((row) => row.withinLimits);
     const colliding = within.filter((row) => row.overlap).length;
-    write(byId("count"), fill(colliding ? words.count_colliding : words.count, { within: within.length, total: rows.length, colliding }));
+    write(byId("count"), fill(colliding ? words.count_colliding : words.count, { within: within.length, total: branches.length, colliding }));
     write(byId("free"), free.map((kind) => words.free[kind]).join(" "));
     this.ghost(null);
     this.mark(q);
@@ -107,8 +108,10 @@ export class SolutionList {
     const { words } = this.data;
     const at = this.#atLimit(row).join(", ");
     if (row.withinLimits && at) return fill(words.within_at, { joints: at });
-    const [first, ...more] = beyondLimits(this.data, row.q); // the rest is said when it is asked for
-    return row.withinLimits ? words.within : fill(words.leaves, { reasons: first }) + (more.length ? ` (+${more.length})` : "");
+    if (row.withinLimits) return words.within;
+    const [beyond] = excesses(this.data.table, row.q); // all of it is said when it is asked for
+    const { name, text } = limited(this.data, beyond);
+    return fill(words.leaves, { joint: name, excess: text(beyond.excess, 0) });
   }
 
   #button(row, parts) {

@@ -45,7 +45,7 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group
+from er3a.pipeline.viewing.answer import Answer
 from er3a.version import __version__
 
 if TYPE_CHECKING:
@@ -63,18 +63,7 @@ VERDICT_WORDS = {
     "not_computed": N_("not computed"),
 }
 
-PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("teach panel")}
-SHORT_NAMES = {
-    "validation": N_("D-H table"),
-    "workspace": N_("Reach"),
-    "collision": N_("Collisions"),
-    "inverse": N_("Poses"),
-    "trajectory": N_("Paths"),
-    "programs": N_("Programs"),
-    "dynamics": N_("Torque"),
-    "vision": N_("Camera"),
-    "teach": N_("Teach panel"),
-}
+PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("Teach panel")}
 FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's header
     "pass": N_("D-H table confirmed"),
     "fail": N_("D-H table contradicted"),
@@ -352,7 +341,6 @@ def render(
             terms=glossary(),
             verdict_words=VERDICT_WORDS,
             pages=PAGES,
-            short_names=SHORT_NAMES,
             at_side=bool(context.pop("at_side", False)),
             language=language.current(),
             summary=summary,
@@ -443,10 +431,7 @@ def render_stage(
         below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
         answer = replace(answer, headline=tr("Not fully checked."), rest=answer.headline, below=below)
     if head.no_verdict:
-        grey = partial(replace, mark="no_verdict", note="", length=0.0, fix=None)
-        rows = [grey(row) for group in answer.groups for row in group.rows if row.play]
-        groups = [Group(tr("Not judged"), rows)]
-        answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."), groups=groups)
+        answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."))
         context["instead"] = alternative_table(study, stored)
     box = _tray_edges(study, stored) if STAGES[stage].obstacles else ""
     template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"

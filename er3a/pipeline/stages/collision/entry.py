@@ -39,7 +39,7 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
 
 STAGE = Stage(
     name="collision",
-    title=N_("collision"),
+    title=N_("Collisions"),
     question=N_("Where is it free of collisions?"),
     settings={"collision": CollisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,

@@ -31,7 +31,7 @@ class DynamicsSettings(StrictModel):
 
 STAGE = Stage(
     name="dynamics",
-    title=N_("dynamics"),
+    title=N_("Torque"),
     question=N_("How much torque do the motors need, and can they supply it?"),
     settings={"dynamics": DynamicsSettings, "trajectory": TrajectorySettings},
     inputs=TRAJECTORY.inputs,

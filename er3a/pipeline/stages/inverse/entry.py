@@ -33,7 +33,7 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
 
 STAGE = Stage(
     name="inverse",
-    title=N_("inverse"),
+    title=N_("Poses"),
     question=N_("Which joint solutions reach a pose?"),
     settings={"inverse": InverseSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,

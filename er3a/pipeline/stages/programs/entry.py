@@ -20,7 +20,7 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
 
 STAGE = Stage(
     name="programs",
-    title=N_("programs"),
+    title=N_("Programs"),
     question=N_("Can the robot carry out its programs?"),
     settings={"trajectory": TrajectorySettings},
     inputs=_inputs,

@@ -26,7 +26,7 @@ def _tables_of(path_file: str) -> list[Path]:
 
 STAGE = Stage(
     name="trajectory",
-    title=N_("trajectory"),
+    title=N_("Paths"),
     question=N_("Are the paths safe, and if not, where and why?"),
     settings={"trajectory": TrajectorySettings},
     inputs=_inputs,

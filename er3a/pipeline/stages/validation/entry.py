@@ -28,7 +28,7 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
 
 STAGE = Stage(
     name="validation",
-    title=N_("validation"),
+    title=N_("D-H table"),
     question=N_("Does the table match the manufacturer's data?"),
     settings={"validation": ValidationSettings},
     inputs=_inputs,

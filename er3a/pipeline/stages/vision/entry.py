@@ -85,7 +85,7 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
 
 STAGE = Stage(
     name="vision",
-    title=N_("vision"),
+    title=N_("Camera"),
     question=N_("Is the camera calibrated well enough, and which objects can be grasped?"),
     settings={"vision": VisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,

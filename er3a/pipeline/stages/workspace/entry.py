@@ -81,7 +81,7 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
 
 STAGE = Stage(
     name="workspace",
-    title=N_("workspace"),
+    title=N_("Reach"),
     question=N_("What can it reach, where are the voids, and where can a tray stand?"),
     settings={"workspace": WorkspaceSettings, "capability": CapabilitySettings, "trajectory": TrajectorySettings},
     inputs=_inputs,

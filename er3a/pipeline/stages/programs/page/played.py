@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +32,7 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     """The programs as far as they were followed, the worst first, as the player shows them.
 
     The motion of each line is an event; each finding is one from its moment to the end of that motion, joints that are
-    too fast together, bodies that touch each from its own. ``q`` is (N, n), rad or m.
+    too fast each from its own, and so bodies that touch. ``q`` is (N, n), rad or m.
     """
     motions = []
     for program in worst_first(results):
@@ -51,7 +50,7 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
 
 
 def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion) -> list[PlayedEvent]:
-    """A finding as long as its line lasts, a singular pose at its moment; none of a rate after its line's first."""
+    """A finding as long as its line lasts, a singular pose at its moment."""
     start = found.program_s or 0.0
     finding, weight = found.finding, WEIGHTS[found.level]
     if is_one(finding, "meets_singularity", "passes_singularity"):
@@ -65,17 +64,11 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
             PlayedEvent(t, max(t, end), tr("collision: {pair}", pair=say(pair)), weight, names_of(pair))
             for t, pair in touches
         ]
-    if not is_one(finding, "too_fast"):
-        joints = ((finding.joint, ""),) if is_one(finding, "above_limit", "below_limit") else ()
-        return [PlayedEvent(start, end, in_few_words(say(finding)), weight, joints=joints)]
-    paces = _paces(program, found)
-    if (start, finding) != min(paces, key=itemgetter(0)):
-        return []
-    needed: dict[int, str] = {}
-    for _, pace in paces:
-        needed.setdefault(pace.joint, times_needed(rate_ratio(pace)))
-    text = rates_text([pace for _, pace in paces])
-    return [PlayedEvent(start, end, text, weight, joints=tuple(needed.items()))]
+    if is_one(finding, "too_fast"):
+        needed = times_needed(rate_ratio(finding))
+        return [PlayedEvent(start, end, rates_text([finding]), weight, joints=((finding.joint, needed),))]
+    joints = ((finding.joint, ""),) if is_one(finding, "above_limit", "below_limit") else ()
+    return [PlayedEvent(start, end, in_few_words(say(finding)), weight, joints=joints)]
 
 
 def in_few_words(text: str) -> str:
@@ -83,13 +76,9 @@ def in_few_words(text: str) -> str:
     return re.split(r"[:;(：；（]| while ", text)[0].strip()
 
 
-def _paces(program: ProgramSummary, found: FindingAt) -> list[tuple[float, Finding]]:
-    """From when on (s) joints are too fast at the line of a finding; the first of each joint is its gravest."""
-    return [
-        (each.program_s, each.finding)
-        for each in _same_line(program, found)
-        if is_one(each.finding, "too_fast") and each.program_s is not None
-    ]
+def _paces(program: ProgramSummary, found: FindingAt) -> list[Finding]:
+    """How joints are too fast at the line of a finding; the first of each joint is its gravest."""
+    return [each.finding for each in _same_line(program, found) if is_one(each.finding, "too_fast")]
 
 
 def _same_line(program: ProgramSummary, found: FindingAt) -> list[FindingAt]:
@@ -110,10 +99,19 @@ def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
 def worst_first(results: ProgramsResults) -> list[ProgramSummary]:
     """Programs with what was found: those that fail first, of them those that were not expected to."""
     programs = [
-        replace(program, findings=tuple(_of_passes(results, program, each) for each in program.findings))
+        replace(program, findings=tuple(_seen(results, program, each) for each in program.findings))
         for program in results.summary.programs
     ]
     return sorted(programs, key=lambda each: (-RANKS[each.outcome], is_met(each)))
+
+
+def _seen(results: ProgramsResults, program: ProgramSummary, found: FindingAt) -> FindingAt:
+    """A finding as the page shows it; what is about a line as a whole is seen where the last line up to it ends."""
+    rows = results.motion.take(results.motion.program == program.name)
+    ends = [t1 for line, _, _, t1 in stretches(rows) if line <= found.line and found in of_line(program, found.line)]
+    shown = _of_passes(results, program, found)
+    unseen = found.motion_s is None and found.program_s is None
+    return replace(shown, program_s=max(ends)) if unseen and ends else shown
 
 
 def _of_passes(results: ProgramsResults, program: ProgramSummary, found: FindingAt) -> FindingAt:
@@ -171,7 +169,7 @@ def _moment(program: ProgramSummary, found: FindingAt) -> FaultMoment:
     text, seen, where = say_first(found.finding), found.program_s, _where(program, found)
     row = line_id(program.name, found.line) if found.line and found in of_line(program, found.line) else ""
     if is_one(found.finding, "too_fast") and seen is not None:
-        text = rates_text([pace for _, pace in _paces(program, found)])
+        text = rates_text(_paces(program, found))
     address = "" if seen is None else address_of("programs", program.name, seen, program.name)
     return FaultMoment(text, where, "", seen, row, address)
 

@@ -78,7 +78,6 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
             _cost(float(shown[each.name].t[-1]), each.least_clearance_mm),
             f"#{each.name}",
             (each.name, 0.0),
-            1.0,
         )
         for each in good
     ]
@@ -173,6 +172,8 @@ def _listing(
         if number in played:
             t0, t1 = played[number]
             leads = stretch(name, t0, t1), moment(name, t1, str(number))
+        elif here and (seen := here[0].program_s) is not None:
+            leads = stretch(name, seen, seen), Markup()
         lines.append(
             dict(
                 number=number,

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator
 
 from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
@@ -91,7 +91,25 @@ def nearness_picture(
     ax.set_xlim(0.0, rows.t_s[-1])
     ax.set_xlabel(axis_label(rows, "t_s"))
     ax.set_ylabel(axis_label(rows, "clearance_mm"))
-    return Picture(figure, tr("{path}: how near it comes", path=name), caption, [(ax, name)])
+    return Picture(figure, tr("Clearance"), caption, [(ax, name)])
+
+
+def fault_picture(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> Picture:
+    """What fails on a path that meets nothing, over its time: its distances from singular poses, or where it meets none
+    and is too fast, the speed of its fastest joint in parts of the limit; below or above the dashed line it fails."""
+    figure, ax = new_figure(width=5.2, height=2.6)
+    if path.too_fast and path.verdict != "singular" and not path.unreachable:
+        title = tr("Joint speed")
+        ax.plot(rows.t_s, rows.speed_ratio, color=palette.MODEL, linewidth=2.2)
+        ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
+        ax.set_ylabel(tr("speed / limit"))
+    else:
+        title = tr("Distance from singular poses")
+        _distances(ax, rows, near)
+    _mark(ax, path)
+    ax.set_xlim(0.0, rows.t_s[-1])
+    ax.set_xlabel(axis_label(rows, "t_s"))
+    return Picture(figure, title, "", [(ax, path.name)])
 
 
 def _axes(figure: Figure, row: int) -> Axes:
@@ -127,22 +145,13 @@ def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> 
         ratio = np.maximum(np.abs(distance) / threshold, 1e-4)
         ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=singularity_word(kind))
     ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
-    _logarithmic(ax, 0.01, 100.0)
+    ax.set_yscale("log")  # with ticks of its own: matplotlib's take longer than all curves
+    ax.set(ylim=(0.01, 100.0), yticks=[0.01, 0.1, 1, 10, 100], yticklabels=["0.01", "0.1", "1", "10", "100"])
+    ax.minorticks_off()
     ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
     legend = ax.legend(loc="lower left", ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
     legend.set_frame_on(True)  # a ground of its own, where a curve passes behind it
     legend.get_frame().set(facecolor="white", edgecolor="none", alpha=0.85)
-
-
-def _logarithmic(ax: Axes, low: float, high: float) -> None:
-    """A logarithmic axis with plain numbers at powers of ten: matplotlib's own ticks take longer than all curves."""
-    ax.set_yscale("log")
-    ax.set_ylim(low, high)
-    decades = np.arange(np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9) + 1)
-    ticks = 10.0 ** (decades if len(decades) < 6 else decades[::2])
-    ax.yaxis.set_minor_locator(NullLocator())
-    ax.yaxis.set_major_locator(FixedLocator(ticks.tolist()))
-    ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
 
 
 def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
@@ -152,14 +161,9 @@ def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
     low, high = np.nanmin(q_deg, axis=0), np.nanmax(q_deg, axis=0)
     lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
     for j in np.flatnonzero(~robot.continuous):
-        for limit, gap, side in ((lower[j], low[j] - lower[j], "top"), (upper[j], upper[j] - high[j], "bottom")):
+        for limit, gap in ((lower[j], low[j] - lower[j]), (upper[j], upper[j] - high[j])):
             if gap < NEAR_LIMIT_DEG:
                 ax.axhline(limit, color=palette.JOINTS[j], linestyle="--", linewidth=1)
-                text = tr("limit of {joint}", joint=palette.JOINT_NAMES[j])
-                ax.text(
-                    0.01, limit, text, transform=ax.get_yaxis_transform(), va=side, fontsize=8, color=palette.JOINTS[j]
-                )
-                ax.margins(y=0.18)
 
 
 def _cut(ax: Axes, values: Reals) -> None:
@@ -177,7 +181,7 @@ def _shades(path: model.PathSummary) -> list[tuple[tuple[model.Stretch, ...], st
     """Stretches that are wrong, with the colour, opacity and name of their shade."""
     shades = [
         (path.out_of_limits, palette.VERDICTS["caution"], 0.16, tr("outside a joint limit")),
-        (path.too_fast, palette.VERDICTS["fail"], 0.14, tr("joint too fast")),
+        (path.too_fast, palette.VERDICTS["fail" if path.fails else "caution"], 0.14, tr("joint too fast")),
         (path.unreachable, palette.INK, 0.14, tr("not reachable")),
         (path.collisions, palette.VERDICTS["fail"], 0.3, tr("collision")),
     ]

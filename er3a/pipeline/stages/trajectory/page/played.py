@@ -286,7 +286,8 @@ def _few_words(part: model.Stretch) -> str:
     """Why a stretch is an event, up to where its details begin; of bodies that overlap the first two."""
     if is_one(part.cause, "bodies_overlap"):
         return say(part.cause.touches[0].pair)
-    return rate_needed(part.cause) if is_one(part.cause, *RATES) else re.split(" ?[;(；（]", cause_text(part))[0]
+    few = re.split(" ?[;(；（]", cause_text(part))[0]
+    return rate_needed(part.cause) if is_one(part.cause, *RATES) else re.split("[:：] ?", few)[-1]
 
 
 def _near_events(path: model.PathSummary, near: Finding | None, clearance: model.Clearances) -> list[PlayedEvent]:

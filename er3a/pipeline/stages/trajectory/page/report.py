@@ -27,7 +27,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
-from er3a.pipeline.stages.trajectory.page.path_figures import nearness_picture, path_picture
+from er3a.pipeline.stages.trajectory.page.path_figures import fault_picture, nearness_picture, path_picture
 from er3a.pipeline.stages.trajectory.page.played import (
     faults,
     motions,
@@ -177,7 +177,6 @@ def _section(
         distance=_clear_of(path),
         near=near is not None,
         branches=[branch_word(label) for label in path.branches],
-        speed=_speed(path, summary.joint_limits),
         strategies=strategies_shown(path),
         programs=[each for each in programs if not _repairs(path, each)],
         repaired=[each for each in programs if _repairs(path, each)],
@@ -209,15 +208,19 @@ def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks, near:
 
 
 def _nearness(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:
-    """Of a path, and of the motion that repairs it: its name, and how near it comes over time."""
+    """Of a path, and of the motion that repairs it: its name, and over time what fails, or else how near it comes."""
     rows, shapes = results.clearance.take(results.clearance.path == path.name), results.summary.verdict.shapes
     motion = path.chosen and path.chosen.motion
     shown = [(path.name, "", path.clearance, path), (repaired(path), path.strategy, motion and motion.clearance, None)]
-    return [
-        (name, nearness_picture(name, least, rows.take(rows.strategy == strategy), shapes, faulty))
+    drawn = {
+        name: nearness_picture(name, least, rows.take(rows.strategy == strategy), shapes, faulty)
         for name, strategy, least, faulty in shown
         if least
-    ]
+    }
+    if path.verdict != "safe" and not path.collisions and (path.too_fast or path.singularities):
+        checks = results.checks.take(results.checks.path == path.name)
+        drawn[path.name] = fault_picture(path, _drawn(path, checks), results.summary.near)
+    return list(drawn.items())
 
 
 def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
@@ -250,7 +253,8 @@ def strategies_shown(path: model.PathSummary) -> list[list[str]]:
         if tried.motion is None:
             rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
         else:
-            rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
+            remark = tr("not usable: {reason}", reason=reasons(tried)) if tried.reasons else ""
+            rows.append([name, *_costs(tried.motion), remark])
     return rows
 
 
@@ -269,25 +273,7 @@ def _clearance(found: model.MinClearance | None) -> str:
     return bracketed(fixed(found.least_mm, 0), say(found.between)) if found else "–"
 
 
-def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:
-    if tried.reasons:
-        return tr("not usable: {reason}", reason=reasons(tried))
-    if tried.name == "detour":
-        return tr("joint moves are unaffected by singularities")
-    return tr("keeps its distance from singular poses") if motion.keeps_clear else tr("goes through the region")
-
-
 def _ratio(value: float | None) -> str:
     if value is None:
         return tr("no bound")
     return f"> {FAR:g}" if value > FAR else fixed(value, 2)
-
-
-def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
-    """The speed of the joint that comes nearest to its limit."""
-    speeds = path.max_joint_speed_deg_s
-    if not speeds:
-        return "–" if not path.joint_speed_bounded and path.verdict == "unreachable" else tr("unbounded")
-    joint = max(range(len(speeds)), key=lambda j: speeds[j] / limits.speed_deg_s[j])
-    unit = " mm/s" if joint + 1 in path.sliding else ""
-    return f"{fixed(speeds[joint], 1)}{unit} (J{joint + 1})"
