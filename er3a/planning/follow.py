@@ -351,8 +351,8 @@ class Followed(ByValue, Displayed):
             f"out of reach from {first:.4g} to {last:.4g} s, after {way:.1f} mm"
             for (first, last), way in zip(self.out_of_reach, ways)
         ]
-        told = (*facts, "a row for each time of yours: .joints(t), in rad")
-        return Sheet.of_table(found, columns, rows, len(rows), told)
+        notes = (*facts, "a row for each time of yours: .joints(t), in rad")
+        return Sheet.of_table(found, columns, rows, len(rows), notes)
 
     def joints(self, t: Reals) -> Reals:
         """Joint angles at times, by the closed form of the branch followed there.

@@ -208,7 +208,7 @@ def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[t
 def _apart(disputed: model.Conflict) -> str:
     """By how much documents contradict each other about a reach."""
     values = [stated.expected for stated in disputed.statements]
-    return tr("{far} apart", far=with_unit(fixed(max(values) - min(values), 1), disputed.unit))
+    return tr("{far} of difference", far=with_unit(fixed(max(values) - min(values), 1), disputed.unit))
 
 
 def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:

@@ -73,7 +73,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
     rest, fix, best = "", None, placing.tried[0] if placing else None
     if placing and best and not sum(map(len, placing.hindered(best).values())):
         rest, centre = whole_sentence(tr("{tray} fits", tray=best.tray.name)), millimetres(best.tray.place.centre_m)
-        fix = Fix(tr("put it into the scene at {centre} mm, with its stand.", centre=centre), "#placement", False)
+        fix = Fix(tr("add it to the scene at {centre} mm, with its stand.", centre=centre), "#placement", False)
     keys = [
         (
             tr("{low} to {high} mm", low=millimetres([reach.lowest]), high=millimetres([reach.highest])),
