@@ -205,7 +205,7 @@ def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[t
     return labels, lines
 
 
-def _apart(disputed: model.Conflict) -> str:
+def _difference(disputed: model.Conflict) -> str:
     """By how much documents contradict each other about a reach."""
     values = [stated.expected for stated in disputed.statements]
     return tr("{far} of difference", far=with_unit(fixed(max(values) - min(values), 1), disputed.unit))
@@ -249,7 +249,7 @@ def _answer(
         if unsure and not bad:
             below = tr("{count} entries could be wrong and pass all the same.", count=unsure)
     if disputed:
-        keys[0] = _apart(disputed[0]), say(disputed[0].subject)
+        keys[0] = _difference(disputed[0]), say(disputed[0].subject)
     if instead:
         fix = Fix(
             tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),
