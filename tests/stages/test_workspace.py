@@ -74,9 +74,8 @@ def test_a_void_has_the_same_bounds_wherever_it_is_and_a_contradicted_table_has_
     for status in ("caution", "fail"):
         report(study, replace(stored, rests_on={"validation": status}), tmp_path / "page.html")
         page = (tmp_path / "page.html").read_text(encoding="utf-8")
-        assert f"An enclosed void of at least {low:.2f} L" in page
+        assert (f"An enclosed void of at least {low:.2f} L" in page) == (status == "caution")
         assert f">{low:.2f} to {-high:.2f}</td>" in page  # the same bounds, outwards, wherever they stand
-        assert f"<dd>{low:.2f}<small>" in page
         assert ("<dt>Payload there</dt>" in page, "No place for the tray is recommended" in page) == (
             status != "fail",
             status == "fail",

@@ -247,9 +247,9 @@ def _answer(
         count, what = (bad, tr("entries contradicted")) if bad else (alone - unsure, tr("entries settled by them"))
         keys.append((f"{count}/{alone}", what))
         if unsure and not bad:
-            below = tr("{count} entries could be wrong and pass all the same.", count=unsure)
+            below = tr("{count} entries may be wrong unnoticed.", count=unsure)
     if disputed:
-        keys[0] = _difference(disputed[0]), say(disputed[0].subject)
+        keys[0] = _difference(disputed[0]), tr("between documents")
     if instead:
         fix = Fix(
             tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),

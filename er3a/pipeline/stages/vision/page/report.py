@@ -114,7 +114,7 @@ def error_picture(each: model.ObjectResult, task: VisionFile) -> Picture:
     ax.axvline(min(task.gripper.tolerance_mm), color=HIGHLIGHT, label=tr("gripper's tolerance"))
     ax.legend(loc="lower right", bbox_to_anchor=(1, 1))
     ax.set_xlabel(tr("error (mm)"))
-    caption = tr("What 95 % of errors stay below, by cause.")
+    caption = tr("95 % bounds, by cause.")
     return Picture(figure, caption, caption)
 
 
@@ -165,7 +165,7 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
     grasped = [each for each in summary.objects if each.grasp]
     caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
     due, found = len(summary.objects) - len(caught), summary.calibration
-    headline = tr("{count} of {due} can be grasped.", count=len(grasped), due=due)
+    headline = tr("{count} of {due} succeed.", count=len(grasped), due=due)
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
     rest = all_caught(len(caught))
@@ -191,7 +191,7 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
         rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
     gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
-    text = tr("give the tool a shape: “carried” in the scene's file.")
+    text = tr("give the tool a shape (“carried”).")
     return Answer(headline, rest, "", keys, groups, Fix(text, "#verdict", False) if "gripper" in gaps else None)
 
 
