@@ -901,7 +901,7 @@ def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, 
         faces = each.faces if isinstance(each, LinkMesh) else hull_faces(points)
         file.write_text(_obj(points, faces), encoding="utf-8")
         made = _geometry(elements[names[each.link]], tag, np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
-        if isinstance(each, ConvexPiece) and each.margin:
+        if isinstance(each, ConvexPiece) and (each.margin or len(each.points) > MOST_CORNERS):  # it is its hull
             made.set("margin", repr(each.margin))
 
 
