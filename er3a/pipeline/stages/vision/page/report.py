@@ -198,7 +198,7 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
 def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
     """An object: how surely it is grasped, or why it is not."""
     if each.grasp is None:
-        return ListRow("fail", each.name, refusal_text(each), f"#{each.name}", moment)
+        return ListRow("fail", each.name, refusal_text(each), "#objects", moment)
     sure = each.grasp.probability
     note = tr("{percent} % succeed", percent=fixed(100 * sure, 1))
     return ListRow("pass", each.name, note, f"#{each.name}", moment)
