@@ -17,6 +17,7 @@ short, whatever the size of the object.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
@@ -175,13 +176,12 @@ class Sheet:
         return cls(heading, columns, shown, max(count - len(shown), 0), facts)
 
 
-class Displayed:
+class Displayed(ABC):
     """Anything that shows itself as a sheet, to ``repr`` and ``print`` as well as to a notebook."""
 
+    @abstractmethod
     def sheet(self) -> Sheet:
-        """What is shown: of a dataclass the name and value of each attribute, if nothing else is said of it."""
-        rows = [(part.name, getattr(self, part.name)) for part in fields(self) if part.repr]  # type: ignore[arg-type]
-        return Sheet.of_table(type(self).__name__, ("attribute", "value"), rows, len(rows))
+        """What is shown."""
 
     def __repr__(self) -> str:
         return as_text(self.sheet())

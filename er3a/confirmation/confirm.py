@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.calibration.parameters import placements_of
 from er3a.comparison.entries import Entry
 from er3a.confirmation.fit import Fitter, Place, Solution
 from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, parts_of, search
@@ -278,7 +279,8 @@ def _layers(solution: Solution, named: Sequence[str]) -> tuple[Layer, ...]:
 
 def _placed(solution: Solution, place: Place, half: Mapping[Entry, float]) -> Placed | None:
     """Base or tool with half its intervals, if it was fitted."""
-    own = {each: width * each.in_unit for each, width in half.items() if each.column.startswith(place)}
+    placing = placements_of((place,), solution.seen.oriented)
+    own = {each: half[each] * each.in_unit for each in placing if each in half}
     if not own:
         return None
     mm, deg = (max((own[each] for each in own if each.unit == unit), default=np.inf) for unit in ("mm", "deg"))

@@ -76,14 +76,15 @@ class NoRotationError(ValueError):
         self.row, self.problem, self.remedy = row, problem, remedy
 
 
-def rotations(form: str, values: Any, tolerance: float = ROUNDED_TOLERANCE) -> Reals:
+def rotations(form: str, values: Any, tolerance: float | None = None) -> Reals:
     """Rotation matrices of orientations in one form.
 
     Parameters
     ----------
     form : one of ``FORMS`` or ``BY_ROW``
     values : (N, k), in the order of the form's columns: deg, rad for rotation vectors, else without unit
-    tolerance : by which a quaternion's length, and R R^T of a matrix, may differ from 1
+    tolerance : by which a quaternion's length, and R R^T of a matrix, may differ from 1; None for what people type,
+        with three decimals at least: a warning says how far what is rounded is off
 
     Returns
     -------
@@ -94,7 +95,7 @@ def rotations(form: str, values: Any, tolerance: float = ROUNDED_TOLERANCE) -> R
     NoRotationError
         a quaternion without unit length, a skewed or mirrored matrix, a rotation vector of more than a turn
     """
-    values = np.asarray(values, float)
+    values, within = np.asarray(values, float), ROUNDED_TOLERANCE if tolerance is None else tolerance
     if form.endswith("_deg"):
         return of_angles(form.removesuffix("_deg"), np.radians(values))
     if form == "rotation_vector_rad":
@@ -103,21 +104,21 @@ def rotations(form: str, values: Any, tolerance: float = ROUNDED_TOLERANCE) -> R
         return exp_rotation(values)
     if form == "quaternion_wxyz":
         length = np.hypot.reduce(values, axis=1)
-        wrong = ~(np.abs(length - 1) <= tolerance)
+        wrong = ~(np.abs(length - 1) <= within)
         _refuse(wrong, "the quaternion's length is {:.9g}, not 1", length, "Divide w, x, y and z by it")
-        if tolerance == ROUNDED_TOLERANCE:
+        if tolerance is None:
             warn_of_rounding("a quaternion", np.abs(length - 1).max(initial=0.0))
         return np.asarray(scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix())
     R = values.reshape(-1, 3, 3)
     R = R.mT if form == "matrix_of_columns" else R
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(R @ R.mT - np.eye(3)).max(axis=(1, 2))
-    remedy = f"Its rows must be orthonormal to {tolerance:g}; write more digits"
-    _refuse(~(off <= tolerance), "the matrix is not a rotation: R R^T differs from 1 by {:.3g}", off, remedy)
+    remedy = f"Its rows must be orthonormal to {within:g}; write more digits"
+    _refuse(~(off <= within), "the matrix is not a rotation: R R^T differs from 1 by {:.3g}", off, remedy)
     mirrored = np.linalg.det(R)
     _refuse(mirrored < 0, "the matrix is left-handed (its determinant is {:.0f})", mirrored, "Change one axis's sign")
     nearest = nearest_rotations(R)
-    if tolerance == ROUNDED_TOLERANCE:
+    if tolerance is None:
         warn_of_rounding("a matrix", np.abs(nearest - R).max(initial=0.0))
     return nearest
 
@@ -127,7 +128,7 @@ def poses_of(
     rows: Sequence[Mapping[str, Any]],
     form: str,
     prefix: str = "",
-    tolerance: float = ROUNDED_TOLERANCE,
+    tolerance: float | None = None,
 ) -> Reals:
     """The poses that rows of a table give.
 

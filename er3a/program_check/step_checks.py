@@ -182,7 +182,8 @@ class Judge:
         if arm is None and (of_tool or isinstance(target, PoseTarget)):
             checked.add(fact("not_followed", text=motion.tool.name, reason="tool"))
         elif placed is None and isinstance(target, PoseTarget):
-            checked.add(*(() if outer else (fact("not_followed", text=motion.base.name, reason="base"),)))
+            if not outer:
+                checked.add(fact("not_followed", text=motion.base.name, reason="base"))
         elif of_tool:
             self._along_tool_path(checked, target)
         else:
