@@ -201,11 +201,19 @@ def shortly(value: Any) -> str:
     if isinstance(value, float):
         return ABSENT if math.isnan(value) else f"{round(value, 9) + 0.0:.6g}"
     if hasattr(value, "code") and hasattr(value, "params"):
-        values = [f"{name}={shortly(part)}" for name, part in value.params.items()]
-        return _cut(value.code + (f" ({', '.join(values)})" if values else ""))
+        parts = [_named(name, part) for name, part in value.params.items()]
+        return _cut(value.code + (f": {', '.join(parts)}" if parts else ""))
     if isinstance(value, tuple | list):
         return _cut(", ".join(shortly(each) for each in islice(value, MAX_ROWS)) or ABSENT)
     return _cut(str(value))
+
+
+def _named(name: str, value: Any) -> str:
+    """A parameter of a finding as a short text; other findings say by their codes what they are."""
+    found = value if isinstance(value, tuple) else (value,)
+    if found and all(hasattr(each, "params") for each in found):
+        return "; ".join(map(shortly, found))
+    return f"{name} {shortly(value)}"
 
 
 def as_text(sheet: Sheet) -> str:

@@ -31,6 +31,9 @@ class Amount:
     value: float
     unit: str
 
+    def __str__(self) -> str:
+        return f"{self.value:.6g} {self.unit}".rstrip()
+
 
 @dataclass(frozen=True)
 class Finding:

@@ -510,7 +510,7 @@ def test_solutions_name_branch_limits_and_the_reason_of_a_refusal(arm):
     narrow = arm.replace(upper=np.where(np.arange(6) == 3, 0.2, arm.upper))
     text = repr(er3a.inverse(narrow, er3a.forward(arm, Q)))
     assert "front_elbow_up_no_flip" in text
-    assert "limit_exceeded (joint=4, side=above" in text
+    assert "limit_exceeded: joint 4, side above" in text
 
 
 def test_hypotheses_remain_a_list(arm):

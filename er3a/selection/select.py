@@ -14,6 +14,7 @@ References
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -26,9 +27,10 @@ from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.collision.along import bodies_of, clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
-from er3a.errors import Er3aError, ShapeError
+from er3a.errors import Er3aError, InputWarning, ShapeError
 from er3a.finding import Amount, Finding, fact, is_one
-from er3a.kinematics.inverse import checked_reference
+from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import checked_reference, inverse
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -228,6 +230,7 @@ def checked_weights(rule: str | Mapping[str, float]) -> dict[RuleName, float]:
     return weights
 
 
+NEARER = 1e-3  # deg or mm: less is no other solution to a person
 COLLIDES = 0.0  # m; a solution with less clearance is refused
 
 
@@ -301,11 +304,18 @@ def select(
         if the solutions are not those of one pose, or q_ref has not n values
     Er3aError
         for an unknown rule, an invalid weight, or a rule whose data are missing
+
+    Warns
+    -----
+    InputWarning
+        at a singular pose, where ``inverse`` was called with another ``q_ref`` and so lacks the nearest solution
     """
     weights = checked_weights(rule)
     q_ref = checked_reference(robot, q_ref)
     if solutions.q.ndim != 2:
         raise ShapeError("solutions.q", solutions.q.shape, f"(n, {robot.joints})")
+    if isinstance(solutions.families, tuple) and solutions.families:
+        _warn_of_nearer(robot, solutions, q_ref)
     measured = {name: RULES[name].measure(robot, solutions.q, q_ref, scene) for name in weights}
     units = {name: RULES[name].unit_of(robot) for name in weights}
     refused = refusals(robot, solutions, scene)
@@ -327,6 +337,17 @@ def select(
     else:
         chosen_reason = why_none(robot, solutions, refused)
     return SolutionRanking(order, measured, units, cost, reason, chosen_reason)
+
+
+def _warn_of_nearer(robot: Robot, solutions: Solutions, q_ref: Reals) -> None:
+    """At a singular pose each reference has its own nearest member of a self-motion: warn where it is not listed."""
+    own = inverse(robot, forward(robot, solutions.families[0].q0), q_ref)
+    nearest_own, listed = (
+        _max_joint_move(robot, each.q[each.within_limits], q_ref, None).min(initial=np.inf) for each in (own, solutions)
+    )
+    if nearest_own < listed - NEARER:
+        found = f"a solution {listed - nearest_own:.3g} {unit_compared(robot)} nearer to q_ref is not among these"
+        warnings.warn(f"{found}: pass q_ref to er3a.inverse, too", InputWarning, stacklevel=4)
 
 
 def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[Finding | None, ...]:

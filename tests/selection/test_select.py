@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import warnings
 
 import numpy as np
 import pytest
@@ -67,6 +68,18 @@ def test_mix_stretches_each_rule_over_its_range(arm, solutions):
     assert [measure.rule for measure in ranking.chosen_reason.measures] == ["time", "limits"]
     assert ranking.chosen_reason.measures[0].value.value == time[ranking.chosen]
     assert ranking.chosen_reason.next_best[0].value.value == time[ranking.order[1]]
+
+
+def test_at_a_singular_pose_a_nearer_solution_of_this_reference_is_named(arm):
+    q = np.array([10, 20, 10, 15, 0, 40]) * DEG
+    pose, q_ref = forward(arm, q), q + np.array([0, 0, 0, 60, 0, -60]) * DEG
+    with pytest.warns(er3a.InputWarning, match=r"a solution .* deg nearer to q_ref is not among these"):
+        select(arm, inverse(arm, pose), "nearest", q_ref)
+    near = inverse(arm, pose, q_ref)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        chosen = select(arm, near, "nearest", q_ref).chosen
+    np.testing.assert_allclose(near.q[chosen], q_ref, atol=1e-9)
 
 
 def test_colliding_solutions_are_refused_with_their_pair(arm, solutions):
