@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
@@ -73,17 +75,35 @@ def written(folder, shown) -> None:
     )
 
 
-@pytest.fixture
-def page(browser, tmp_path):
-    robot = load_robot("er3a_c60")
+@pytest.fixture(scope="module")
+def file(tmp_path_factory) -> Path:
+    robot, folder = load_robot("er3a_c60"), tmp_path_factory.mktemp("player")
     still = PlayedMotion("still", "It stands.", np.array([0.0, 1.0]), np.zeros((2, 6)))
     way = PlayedMotion("way", "It goes.", np.arange(9.0), np.zeros((9, 6)))
     scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
-    written(tmp_path, player(robot, [bow(robot), still, way], scene))
+    written(folder, player(robot, [bow(robot), still, way], scene))
+    return folder / "page.html"
+
+
+@pytest.fixture
+def page(browser, file):
+    """The page as it opens."""
     browser.get_log("browser")
-    browser.get((tmp_path / "page.html").as_uri())
+    browser.get("about:blank")  # an address that differs in its fragment alone loads nothing
+    browser.get(file.as_uri())
     WebDriverWait(browser, 10).until(lambda _: clock(browser))
     return browser
+
+
+@pytest.fixture
+def used(request, browser, file):
+    """The page as another test has left it, for those that choose a motion's moment themselves."""
+    return browser if browser.current_url.startswith(file.as_uri()) else request.getfixturevalue("page")
+
+
+def at_the_event(browser) -> None:
+    browser.execute_script("document.querySelector('[data-t]').click()")
+    until(browser, lambda: clock(browser).startswith("1.250"))
 
 
 def clock(browser) -> str:
@@ -108,13 +128,12 @@ def test_it_draws_the_poses_of_forward_kinematics(page):
     assert [line for line in page.get_log("browser") if line["level"] == "SEVERE"] == []
 
 
-def test_an_event_leads_to_its_moment_and_the_plot_s_cursor_follows(page):
-    page.execute_script("document.querySelector('[data-t]').click()")
-    until(page, lambda: clock(page).startswith("1.250"))
-    assert told(page) == "stretched"
-    cursor = page.find_element(By.CSS_SELECTOR, ".cursor")
-    image = page.find_element(By.CSS_SELECTOR, "figure[data-panels] img")
-    edge = page.execute_script(
+def test_an_event_leads_to_its_moment_and_the_plot_s_cursor_follows(used):
+    at_the_event(used)
+    assert told(used) == "stretched"
+    cursor = used.find_element(By.CSS_SELECTOR, ".cursor")
+    image = used.find_element(By.CSS_SELECTOR, "figure[data-panels] img")
+    edge = used.execute_script(
         "const s = getComputedStyle(arguments[0]); return parseFloat(s.paddingLeft) + parseFloat(s.borderLeftWidth)",
         image,
     )
@@ -179,11 +198,11 @@ def test_words_in_the_picture_don_t_overlap_and_what_matters_is_named(browser, t
             )
 
 
-def test_a_motion_s_start_and_end_are_named(page):
+def test_a_motion_s_start_and_end_are_named(used):
     """One that stays where it is has neither."""
     ends = {"start", "end"}
-    assert ends <= {text for text, *_ in page.execute_async_script(WRITTEN, "bow", "1.0")}
-    assert not ends & {text for text, *_ in page.execute_async_script(WRITTEN, "still", "0.5")}
+    assert ends <= {text for text, *_ in used.execute_async_script(WRITTEN, "bow", "1.0")}
+    assert not ends & {text for text, *_ in used.execute_async_script(WRITTEN, "still", "0.5")}
 
 
 JOINTS = """return [...document.querySelectorAll(".player .joints dl > div")].map((cell) => {
@@ -191,14 +210,13 @@ JOINTS = """return [...document.querySelectorAll(".player .joints dl > div")].ma
 })"""
 
 
-def test_it_tells_the_joint_values_and_how_far_each_is_from_its_nearer_limit(page):
+def test_it_tells_the_joint_values_and_how_far_each_is_from_its_nearer_limit(used):
     robot = load_robot("er3a_c60")
     lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
-    page.execute_script("document.querySelector('[data-t]').click()")
-    until(page, lambda: clock(page).startswith("1.250"))
+    at_the_event(used)
     q = (0.2 + 0.6 * 1.25 / 2.0) * upper
     room = np.minimum(q - lower, upper - q)
-    told = page.execute_script(JOINTS)
+    told = used.execute_script(JOINTS)
     for i, (value, margin, mark) in enumerate(told):
         assert abs(float(value.removesuffix("°").replace("−", "-")) - q[i]) < 0.07
         assert abs(float(margin.split()[0]) - room[i]) < 0.07
@@ -210,13 +228,12 @@ NEAREST = "return document.querySelector('.player .joints .nearest').textContent
 SIGN = "return getComputedStyle(document.querySelector('.player .joints .least .room'), '::before').content"
 
 
-def test_without_a_fault_the_joint_nearest_its_limit_is_named_and_bears_no_sign_of_one(page):
-    page.execute_script("document.querySelector('[data-t]').click()")
-    until(page, lambda: clock(page).startswith("1.250"))
-    cells = page.execute_script(JOINTS)
+def test_without_a_fault_the_joint_nearest_its_limit_is_named_and_bears_no_sign_of_one(used):
+    at_the_event(used)
+    cells = used.execute_script(JOINTS)
     (least,) = (j for j, (_, _, mark) in enumerate(cells, 1) if mark == "least")
-    assert page.execute_script(NEAREST) == f"Nearest its limit: J{least}, {cells[least - 1][1].split()[0]}°."
-    assert page.execute_script(SIGN) == "none"
+    assert used.execute_script(NEAREST) == f"Nearest its limit: J{least}, {cells[least - 1][1].split()[0]}°."
+    assert used.execute_script(SIGN) == "none"
 
 
 def test_joint_values_keep_their_place_while_it_plays(page):
@@ -278,15 +295,15 @@ def test_the_joints_that_fail_are_marked_instead_of_the_one_nearest_its_limit(br
     assert "least" not in {mark for t in ("0.6", "0.9", "1.5") for _, mark in found[t]}
 
 
-def test_another_motion_starts_at_its_start(page):
-    page.execute_script(
+def test_another_motion_starts_at_its_start(used):
+    used.execute_script(
         "const chooser = document.querySelector('.player .motion');"
         "chooser.value = 'still'; chooser.dispatchEvent(new Event('change'))"
     )
-    until(page, lambda: told(page) == "It stands.")
-    assert clock(page) == "0.000 of 1.000 s"
-    assert not page.find_element(By.CSS_SELECTOR, ".player .play").is_displayed()  # it has nothing to play
-    assert not page.find_element(By.CSS_SELECTOR, ".cursor").is_displayed()
+    until(used, lambda: told(used) == "It stands.")
+    assert clock(used) == "0.000 of 1.000 s"
+    assert not used.find_element(By.CSS_SELECTOR, ".player .play").is_displayed()  # it has nothing to play
+    assert not used.find_element(By.CSS_SELECTOR, ".cursor").is_displayed()
 
 
 def test_the_page_s_address_names_a_moment(page):
@@ -335,5 +352,5 @@ def test_an_arm_with_meshes_is_drawn_as_them_as_the_shapes_checked_or_as_both(br
     assert browser.get_log("browser") == []
 
 
-def test_an_arm_without_meshes_has_one_look(page):
-    assert page.find_elements(By.CSS_SELECTOR, ".looks") == []
+def test_an_arm_without_meshes_has_one_look(used):
+    assert used.find_elements(By.CSS_SELECTOR, ".looks") == []

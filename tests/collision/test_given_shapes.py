@@ -20,7 +20,7 @@ ARMS = {
     "panda": (SHARED / "panda_description/urdf/panda.urdf", 0.5),
     "irb140": (XACRO / "abb_irb140_description/urdf/irb140.urdf", 0.3),
 }
-POSES = 60
+POSES = 30
 
 
 @pytest.mark.parametrize("name", ARMS)

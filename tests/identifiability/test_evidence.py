@@ -164,11 +164,10 @@ def test_a_table_that_documents_contradict_is_judged_from_the_one_that_diagnosis
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("entry", "accused"), [("a2", "a2"), ("d1", "base")])  # d1 and the base act alike
-def test_one_wrong_length_accuses_no_other(entry, accused):
-    others = {"a2", "d1", "d4"} - {entry}
-    found = about(changed(load_robot("er3a_c60"), entry, 5.0), accused, *others)
-    assert found[accused].status == "contradicted"
+def test_one_wrong_length_accuses_no_other():
+    others = {"a2", "d4"}
+    found = about(changed(load_robot("er3a_c60"), "d1", 5.0), "base", *others)
+    assert found["base"].status == "contradicted"  # d1 and the base act alike
     assert {found[each].status for each in others} <= set(SETTLED)
 
 

@@ -69,7 +69,6 @@ def smallest_readings(rows: oracle.Rows, stated: list[oracle.Statement]) -> list
     ("name", "kinds"),
     [
         ("er3a_c60", ("positions",)),
-        ("er3a_c60", ("positions", "axes", "directions")),
         ("er3_600", ("positions", "directions")),
     ],
 )

@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 
 import er3a
 from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.joint_limits import nearest_equivalent, within
-from testing.arms import DEG, OTHERS_LONG, arms, joints_at_random, joints_within, make_arm, margin, pose_errors
+from testing.arms import DEG, OTHERS_LONG, arms, joints_at_random, joints_within, margin, pose_errors
 from testing.singular_poses import CLASSES, branch_of, joints_near, turned
 
 
@@ -141,17 +140,6 @@ def test_wrong_shapes_are_refused(robot):
         inverse_batch(robot, T, np.zeros((2, 6)))
     with pytest.raises(PoseError, match=r"q_ref\[1\] holds NaN"):
         inverse_batch(robot, T, np.array([[0.0] * 6, [np.nan] * 6, [0.0] * 6]))
-
-
-@pytest.mark.long
-def test_other_arms_are_solved_by_their_class():
-    arm = make_arm(d=[0.3, 0, 0, 0.35, 0.02, 0.08])
-    q = np.random.default_rng(4).uniform(-2, 2, (50, 6))
-    found = inverse_batch(arm, forward(arm, q))
-    assert (found.method.arm_class, found.q.shape, found.method.named) == ("general_six", (50, 16, 6), False)
-    assert found.certain.mean() > 0.9
-    own = np.abs(wrap_to_pi(found.q - q[:, None])).max(axis=2)
-    assert np.nanmax(np.nanmin(own, axis=1)) < 1e-7
 
 
 def test_public_name():

@@ -17,6 +17,7 @@ from roboticstoolbox import DHRobot, RevoluteDH
 
 import er3a
 from er3a.files.robot_library import load_robot
+from er3a.identifiability import continuous
 from er3a.pipeline import language
 from er3a.pipeline.article.article_numbers import EXAMPLE, agreements, article_numbers
 from er3a.pipeline.article.article_page import write_article
@@ -56,6 +57,8 @@ def folder(tmp_path_factory, small_results) -> Path:
     (place / "article.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
+        patch.setattr(continuous, "SPREAD", 8)  # the page shows nothing of tables that evidence finds far away,
+        patch.setattr(continuous, "ROUNDS", 0)  # for which validation searches longest
         loaded = load_study("article.yaml")
         for robot in loaded.robots:
             for stage in STAGES:
