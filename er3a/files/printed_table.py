@@ -97,6 +97,7 @@ class PrintedTable:
 
 
 MAX_BYTES = 200_000
+RIGHT_WITHIN = 1e-3  # rad and deg: right angles as printed with three decimals or more
 MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
 
 
@@ -352,7 +353,7 @@ class _Table:
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
-        self.text = re.sub(r"(?m)^[ \t]*[%#].*$", "", text) if from_code else without_latex(plain(text))
+        self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", text) if from_code else without_latex(plain(text))
         self.given = self._given()
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.kinds = self._kinds()
@@ -413,13 +414,6 @@ class _Table:
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
                 _keep(found, name.strip(), _in_unit(value, unit))
-        above = "\n".join(self.text.split("\n")[: self.rows[0][0]])
-        # What is assigned last counts, if nothing chooses and the function is the same.
-        if not re.search(r"\b(?:if|else|elif|elseif|case|switch|for|while)\b|(?s:\b(def|function)\b.*\b\1\b)", above):
-            last = {name: _in_unit(value, unit) for name, value, unit in _GIVEN.findall(above)}
-            used = " ".join(last.values())  # with the value that a name had there
-            again = (name for name, value in found.items() if value == TWO_VALUES and name not in used)
-            found |= {name: last[name] for name in again if name in last}
         found |= dict.fromkeys(re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text), TWO_VALUES)
         plainly: dict[str, str] = {}
         for name, value in found.items():
@@ -597,6 +591,8 @@ class _Table:
         rows = zip(self.columns["joint"], turning, self.rows)
         offsets = [f"joint {n} {cells[k].strip()}" for n, each, (_, cells) in rows if n and each and each.number]
         if "offset" not in self.column:
+            if not any(each.variables for each in found):
+                self._check_pose(k)
             self._add(k, "offset", turning)
             if offsets:
                 self.notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
@@ -604,6 +600,14 @@ class _Table:
             self._refuse(None, k, f"{offsets[0]}: another column holds offsets too", "Keep one")
         if any(sliding):
             self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])
+
+    def _check_pose(self, k: int) -> None:
+        """Refuse angles that are no right ones, which may be those of a pose."""
+        for row, each in enumerate(self.amounts["theta"]):
+            right = {"deg": (90.0,), "rad": (math.pi / 2,)}.get(each.unit, (90.0, math.pi / 2)) if each else ()
+            if each and all(abs(math.remainder(each.number, quarter)) > RIGHT_WITHIN for quarter in right):
+                problem = f"'{self.rows[row][1][k]}' may be an offset, or the angle of a pose"
+                self._refuse(row, k, problem, "Say so by --column: offset if theta = q + offset, or - if it is a pose")
 
     def _add(self, k: int, name: str, found: list[CellAmount | None]) -> None:
         """A column of a quantity, in the unit that its heading or cells say; in mm or degrees if none do."""
