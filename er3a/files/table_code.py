@@ -529,7 +529,7 @@ def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
 def _matrix(code: Code, group: CodeGroup) -> Grid:
     """A matrix with the names of its columns; [] if it is none, or a pose."""
     rows = _rows(code, group)
-    if len(rows) < 2 or any(re.match(r"[\[{(]|.*:|-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for cell in rows[0][1]):
+    if len(rows) < 2 or any(re.match(r"[\[{]|\([^()]*,|.*:|-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for cell in rows[0][1]):
         return []
     pose = len(rows) == 4 and re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1]))
     if pose or len({len(cells) for _, cells in rows}) > 1:

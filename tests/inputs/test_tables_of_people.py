@@ -276,6 +276,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
     ("text", "names"),
     [
         ("dh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]", "--column"),  # no names
+        ("dh = [[0, 0.29, 0, (pi/2)], [0.27, 0, 0, 2]]", "line 1: a matrix"),
         ("theta,d,a,alpha,a\n0,290,0,90,0\n0,0,270,0,0\n", "--column"),  # one twice
         (
             "a, alpha, d, t = symbols('a:d')\ndh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]",
