@@ -213,7 +213,7 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
     for grids, kind in _read(text, columns):
         if tables := [_with_names(table) for grid in grids for table in _headed(grid, columns)]:
-            return [_trimmed(table) for table in tables] if kind == "blanks" else tables, kind == "program"
+            return tables, kind == "program"
     if bare := code_grids(text, headed=False):
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
@@ -285,17 +285,6 @@ def _with_names(table: Grid) -> Grid:
     firsts = [cells[0] for _, cells in rows if len(cells) == len(header) + 1]
     named = len(firsts) == len(rows) and all(map(_NAMED.fullmatch, firsts))
     return [(line, ["joint", *header]), *rows] if named else table
-
-
-def _trimmed(table: Grid) -> Grid:
-    """A table without what follows its last known column, where headings or cells hold blanks."""
-    header = table[0][1]
-    widths = {len(cells) for _, cells in table}
-    known = [bool(heading_of(name)) for name in header]
-    last = len(known) - known[::-1].index(True)
-    if len(widths) > 1 and all(known[1:last]) and min(widths) >= last < len(header):
-        return [(line, cells[:last]) for line, cells in table]
-    return table
 
 
 def _stacked(text: str) -> list[Grid]:
