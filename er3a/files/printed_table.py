@@ -97,6 +97,7 @@ class PrintedTable:
 
 
 MAX_BYTES = 200_000
+RIGHT_WITHIN = 1e-3  # rad and deg: right angles as printed with three decimals or more
 MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
 
 
@@ -212,7 +213,7 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
     for grids, kind in _read(text, columns):
         if tables := [_with_names(table) for grid in grids for table in _headed(grid, columns)]:
-            return [_trimmed(table) for table in tables] if kind == "blanks" else tables, kind == "program"
+            return tables, kind == "program"
     if bare := code_grids(text, headed=False):
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
@@ -286,17 +287,6 @@ def _with_names(table: Grid) -> Grid:
     return [(line, ["joint", *header]), *rows] if named else table
 
 
-def _trimmed(table: Grid) -> Grid:
-    """A table without what follows its last known column, where headings or cells hold blanks."""
-    header = table[0][1]
-    widths = {len(cells) for _, cells in table}
-    known = [bool(heading_of(name)) for name in header]
-    last = len(known) - known[::-1].index(True)
-    if len(widths) > 1 and all(known[1:last]) and min(widths) >= last < len(header):
-        return [(line, cells[:last]) for line, cells in table]
-    return table
-
-
 def _stacked(text: str) -> list[Grid]:
     """A table that was copied with each cell on a line of its own, as far as its rows are a table's."""
     lines = [line.strip() for line in without_latex(plain(text)).split("\n")]
@@ -352,7 +342,7 @@ class _Table:
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
-        self.text = re.sub(r"(?m)^[ \t]*[%#].*$", "", text) if from_code else without_latex(plain(text))
+        self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", text) if from_code else without_latex(plain(text))
         self.given = self._given()
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.kinds = self._kinds()
@@ -413,13 +403,6 @@ class _Table:
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
                 _keep(found, name.strip(), _in_unit(value, unit))
-        above = "\n".join(self.text.split("\n")[: self.rows[0][0]])
-        # What is assigned last counts, if nothing chooses and the function is the same.
-        if not re.search(r"\b(?:if|else|elif|elseif|case|switch|for|while)\b|(?s:\b(def|function)\b.*\b\1\b)", above):
-            last = {name: _in_unit(value, unit) for name, value, unit in _GIVEN.findall(above)}
-            used = " ".join(last.values())  # with the value that a name had there
-            again = (name for name, value in found.items() if value == TWO_VALUES and name not in used)
-            found |= {name: last[name] for name in again if name in last}
         found |= dict.fromkeys(re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text), TWO_VALUES)
         plainly: dict[str, str] = {}
         for name, value in found.items():
@@ -597,6 +580,8 @@ class _Table:
         rows = zip(self.columns["joint"], turning, self.rows)
         offsets = [f"joint {n} {cells[k].strip()}" for n, each, (_, cells) in rows if n and each and each.number]
         if "offset" not in self.column:
+            if not any(each.variables for each in found):
+                self._check_pose(k)
             self._add(k, "offset", turning)
             if offsets:
                 self.notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
@@ -604,6 +589,14 @@ class _Table:
             self._refuse(None, k, f"{offsets[0]}: another column holds offsets too", "Keep one")
         if any(sliding):
             self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])
+
+    def _check_pose(self, k: int) -> None:
+        """Refuse angles that are no right ones, which may be those of a pose."""
+        for row, each in enumerate(self.amounts["theta"]):
+            right = {"deg": (90.0,), "rad": (math.pi / 2,)}.get(each.unit, (90.0, math.pi / 2)) if each else ()
+            if each and all(abs(math.remainder(each.number, quarter)) > RIGHT_WITHIN for quarter in right):
+                problem = f"'{self.rows[row][1][k]}' may be an offset, or the angle of a pose"
+                self._refuse(row, k, problem, "Say so by --column: offset if theta = q + offset, or - if it is a pose")
 
     def _add(self, k: int, name: str, found: list[CellAmount | None]) -> None:
         """A column of a quantity, in the unit that its heading or cells say; in mm or degrees if none do."""

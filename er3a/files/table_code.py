@@ -529,9 +529,10 @@ def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
 def _matrix(code: Code, group: CodeGroup) -> Grid:
     """A matrix with the names of its columns; [] if it is none, or a pose."""
     rows = _rows(code, group)
-    if len(rows) < 2 or any(re.match(r"[\[{(]|.*:|-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for cell in rows[0][1]):
+    if len(rows) < 2 or any(re.match(r"[\[{]|\([^()]*,|.*:|-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for cell in rows[0][1]):
         return []
-    if len({len(cells) for _, cells in rows}) > 1 or re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):
+    pose = len(rows) == 4 and re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1]))
+    if pose or len({len(cells) for _, cells in rows}) > 1:
         return []
     several = len({line for line, _ in rows}) == len(rows)
     labels = [code.comments.get(line, "") if several else "" for line, _ in rows]
@@ -656,10 +657,6 @@ def _indexed(code: Code) -> Iterator[str]:
     for name, row, number in re.findall(pattern, "\n".join([code.text, *made])):
         if heading_of(name):
             found.setdefault(row, {})[int(number)] = name
-    for name, number in re.findall(r"(?m)^\s*(?:static |const(?:expr)? |int )*(\w+)\s*=\s*(\d)\s*;?\s*$", code.text):
-        short = name if heading_of(name) else name.rpartition("_")[2]
-        if heading_of(short) and re.search(rf"[\[(,]\s*{name}\s*[\])]", code.text):
-            found.setdefault("", {})[int(number)] = short
     for names in found.values():
         yield ",".join(names[k] for k in sorted(names))
 
@@ -750,10 +747,13 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     if not {*quantities_of(found)} >= {"alpha", "a", "d"} or (len(found) == 3 and "DH_A" not in code.text):
         return  # they may be in a matrix of these symbols
     for name, entries in found.items():
-        last = entries[max(entries)]
+        last, cells = entries[max(entries)], {k: each[4].strip() for k, each in entries.items()}
         of_link = found["alpha" if name in ("alpha", "a") else "d"]
-        if gaps := {*range(min(of_link), max(entries) + 1)} - {*entries}:
+        gaps = {*range(min(of_link), max(entries) + 1)} - {*entries}
+        if gaps and last[3] == ":" and _place(name) == "theta":  # what is not replaced stays a variable
+            cells |= {k: f"{name}{k}" for k in gaps}
+        elif gaps:
             problem = f"{name}{min(gaps)} is missing"
             raise InputError(None, f"line {code.line(last.start())}", problem, "Give one for each joint")
         before = "(i-1)" if min(of_link) < min(found["d"]) else ""
-        yield name + before, [entries[k][4].strip() for k in sorted(entries)], code.line(last.start()), last[3]
+        yield name + before, [cells[k] for k in sorted(cells)], code.line(last.start()), last[3]

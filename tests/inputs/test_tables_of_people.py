@@ -276,6 +276,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
     ("text", "names"),
     [
         ("dh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]", "--column"),  # no names
+        ("dh = [[0, 0.29, 0, (pi/2)], [0.27, 0, 0, 2]]", "line 1: a matrix"),
         ("theta,d,a,alpha,a\n0,290,0,90,0\n0,0,270,0,0\n", "--column"),  # one twice
         (
             "a, alpha, d, t = symbols('a:d')\ndh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]",
@@ -331,6 +332,9 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "two values",
         ),
         ("i,a,alpha,d\n1,L,0,0\n2,0,0,1\n\nL = f * g\n", "holds L = f"),
+        ("d1 = 0.1\nd1 = 0.29\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n", "two values"),
+        ("# theta, d, a, alpha\nM = [(radians(45), 0.5, 1.0, 0), (radians(30), 0, 1.0, 0)]\n", "row 2, .* of a pose"),
+        ("i,a (mm),alpha (deg),d (mm),theta (deg)\n1,0,90,300,0\n2,270,0,0,-79.4\n", "offset if theta = q"),
         ("d1 = 1\nd1 += 1\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n", "two values"),
         ("d1 = 3\nd1 = d1 / 9\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n", "two values"),
         ("# a alpha d theta\nDH: [0, 0, 0.3, 0,\n 0.2, 0, 0, 0]\ntype_joints: 'RP'\n", "types"),
@@ -513,11 +517,6 @@ $L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
             "standard",
         ),
         (
-            "ALPHA = 1\nA = 0\nD = 2\nTHETA = 3\ndh = [[0, -pi/2, 0.29, q1], [0.27, 0, 0, q2 - pi/2]]\n"
-            "T = row(dh[i][ALPHA], dh[i][A], dh[i][D], dh[i][THETA])",
-            "standard",
-        ),
-        (
             "def row(alpha, d, a, theta):\n  pass\nP = [(0, -pi/2, 0.29, 0), (0.27, 0, 0, -pi/2)]\n"
             "T = row(P[i][1], P[i][2], P[i][0], q[i] + P[i][3])",
             "standard",
@@ -546,7 +545,9 @@ $L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
             "enum { A, ALPHA, D, THETA };\ndouble M[2][4] = {{0, -M_PI/2, 0.29, 0}, {0.27, 0, 0, -M_PI/2}};\n",
             "standard",
         ),
-        ("d1 = 0.1\nd1 = 0.29\n# a alpha d theta\nM = [[0, -pi/2, d1, 0], [0.27, 0, 0, -pi/2]]\nd1 = 3", "standard"),
+        ("// double d1 = 0.3;\nd1 = 0.29;\n# a alpha d theta\nM = [0 -pi/2 d1 0;\n 0.27 0 0 -pi/2];", "standard"),
+        ("% [theta a alpha d]\nM = [0 0 -pi/2 0.29;\n -pi/2 0.27 0 0.0];\nN = [0 0 0 1];", "standard"),
+        (SUBSTITUTED.replace("q1: q1,", ""), "modified"),  # a symbol that nothing replaces is a variable
         (
             'convention: "modified_dh"  # or "standard_dh"\nrows:\n - {a: 0, alpha: -pi/2, d: 0.29, offset: 0}\n'
             " - {a: 0.27, alpha: 0, d: 0, offset: -pi/2}\n",
