@@ -60,6 +60,9 @@ CHUNK = 4_000  # points whose bodies are placed at a time
 MOST_TOUCHING = 200  # points of a motion at which depths are measured
 HALVINGS = 5  # of the part of a way in which bodies touch first
 CORNER_POINTS = 9
+# A line goes to the nearest configuration, whatever its target states. What a pose's other solutions change of axis 1, 4
+# or 6 is half a turn or more, so within this of the stated quarter it is the stated solution.
+QUARTER = np.pi / 2
 
 
 @dataclass(eq=False)
@@ -247,7 +250,8 @@ class Judge:
         if given is not None and (other := arrives_otherwise(found, given)) is not None:
             checked.add(other)
         branch = target.branch if isinstance(target, PoseTarget) else None
-        if branch is not None and found.end is not None and not solutions_meant(branch, arm, found.end[None])[0]:
+        ends = None if branch is None or found.end is None else solutions_meant(branch, arm, found.end[None], QUARTER)
+        if ends is not None and not ends[0]:
             checked.add(fact("configuration_not_met", text=_configuration(target)))
 
     def _via(self, checked: CheckedMotion) -> Reals | None:

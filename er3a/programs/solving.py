@@ -91,15 +91,18 @@ def _nearest(solutions: Reals, q: Reals) -> Reals | None:
     return found
 
 
-def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals) -> Flags:
+def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals, quarters_off: float = AT_A_CHANGE) -> Flags:
     """Which of joint vectors (k, n) in rad, solutions of one target, are meant: (k,).
+
+    ``quarters_off`` (rad) is how far a joint may be from the quarter of a turn that is stated for it.
 
     Where none is exactly, joints within ``AT_A_CHANGE`` of where their sign or quarter changes belong to both sides:
     the program rounds its numbers, and no arm is exactly as its table. The wrist centre's sides are compared with those
     in the arm's zero pose; what has no side there, or has no such sides at all, as an arm without a spherical wrist, is
     not checked.
     """
-    for beside in (0.0, AT_A_CHANGE):
+    in_quarters = np.isfinite(branch.ranges).all(axis=1)
+    for beside in (np.zeros(len(in_quarters)), np.where(in_quarters, quarters_off, AT_A_CHANGE)):
         within = (rows >= branch.ranges[:, 0] - beside) & (rows <= branch.ranges[:, 1] + beside)
         met: Flags = np.asarray(within.all(axis=1), np.bool_)
         if met.any():
