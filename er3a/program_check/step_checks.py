@@ -49,7 +49,7 @@ from er3a.program_check.motion_checks import (
 )
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget, Target, UnresolvedTarget, Zone
-from er3a.programs.solving import rows_meant, solutions_meant
+from er3a.programs.solving import AT_A_CHANGE, rows_meant, solutions_meant
 from er3a.robots.joint_limits import equivalents_within
 from er3a.robots.robot import Robot
 
@@ -288,7 +288,8 @@ class Judge:
             return None
         rows, _ = equivalents_within(checked.arm, rows, reference)
         if (checked.motion.kind == "joint" or before is None) and target.branch is not None:
-            rows, met = rows_meant(target.branch, checked.arm, pose, rows)
+            off = AT_A_CHANGE if checked.motion.kind == "joint" else QUARTER
+            rows, met = rows_meant(target.branch, checked.arm, pose, rows, off)
             if not met:
                 checked.add(fact("configuration_not_met", text=_configuration(target)))
         away = np.abs(rows - reference).max(axis=1)

@@ -120,13 +120,16 @@ def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals, quarters_o
     return met
 
 
-def rows_meant(branch: MeantSolution, robot: Robot, pose: Reals, rows: Reals) -> tuple[Reals, bool]:
+def rows_meant(
+    branch: MeantSolution, robot: Robot, pose: Reals, rows: Reals, quarters_off: float = AT_A_CHANGE
+) -> tuple[Reals, bool]:
     """The solutions of a pose that are meant.
 
     Parameters
     ----------
     pose : (4, 4), T_world_tool, m
     rows : (k, n), rad or m, its solutions
+    quarters_off : as of :func:`solutions_meant`
 
     Returns
     -------
@@ -138,14 +141,14 @@ def rows_meant(branch: MeantSolution, robot: Robot, pose: Reals, rows: Reals) ->
     such a pose by its last digit, and one solution is left of all. So joints turn against each other, too, in the
     direction that moves the tool least, as long as the pose stays the same but for those digits.
     """
-    met = solutions_meant(branch, robot, rows)
+    met = solutions_meant(branch, robot, rows, quarters_off)
     if not met.any():
         least = np.linalg.svd(jacobian(robot, rows))[2][:, -1]
         turns = TURNS[:, None, None] * least / np.abs(least).max(axis=1, keepdims=True)
         turned = (rows + turns).reshape(-1, robot.joints)
         stays = np.abs(forward(robot, turned) - pose).max(axis=(1, 2)) < ROUNDED
         turned = turned[stays & within(robot, turned)]
-        if len(turned) and (met := solutions_meant(branch, robot, turned)).any():
+        if len(turned) and (met := solutions_meant(branch, robot, turned, quarters_off)).any():
             rows = turned
     return (rows[met], True) if met.any() else (rows, False)
 
