@@ -49,7 +49,7 @@ from er3a.program_check.motion_checks import (
 )
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget, Target, UnresolvedTarget, Zone
-from er3a.programs.solving import AT_A_CHANGE, rows_meant, solutions_meant
+from er3a.programs.solving import rows_meant, solutions_meant
 from er3a.robots.joint_limits import equivalents_within
 from er3a.robots.robot import Robot
 
@@ -147,7 +147,9 @@ class Judge:
             self.motions[key] = checked = self._checked(motion, before)
             checked.guessed = before is not None and _rounded(before) in self._guessed
             chosen = motion.kind != "joint" or isinstance(motion.target, PoseTarget)
-            first = any(is_one(each, "configuration_guessed") for each in checked.findings)
+            followed = motion.kind != "joint" and before is not None  # ends where its way leads
+            guesses = ("configuration_guessed",) if followed else ("configuration_guessed", "configuration_not_met")
+            first = any(each.code in guesses for each in checked.findings)
             if checked.end is not None and (first or (checked.guessed and chosen)):
                 self._guessed.add(_rounded(checked.end))
         return self.motions[key]
@@ -288,8 +290,10 @@ class Judge:
             return None
         rows, _ = equivalents_within(checked.arm, rows, reference)
         if (checked.motion.kind == "joint" or before is None) and target.branch is not None:
-            off = AT_A_CHANGE if checked.motion.kind == "joint" else QUARTER
-            rows, met = rows_meant(target.branch, checked.arm, pose, rows, off)
+            rows, met = rows_meant(target.branch, checked.arm, pose, rows)
+            if not met:  # the stated solution all the same, if there is one
+                rows, met = rows_meant(target.branch, checked.arm, pose, rows, QUARTER)
+                met = met and checked.motion.kind != "joint"
             if not met:
                 checked.add(fact("configuration_not_met", text=_configuration(target)))
         away = np.abs(rows - reference).max(axis=1)
