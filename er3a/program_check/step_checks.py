@@ -60,8 +60,8 @@ CHUNK = 4_000  # points whose bodies are placed at a time
 MOST_TOUCHING = 200  # points of a motion at which depths are measured
 HALVINGS = 5  # of the part of a way in which bodies touch first
 CORNER_POINTS = 9
-# A line goes to the nearest configuration, whatever its target states. What a pose's other solutions change of axis 1, 4
-# or 6 is half a turn or more, so within this of the stated quarter it is the stated solution.
+# A line goes to the nearest configuration, whatever its target states. A pose's other solutions turn axis 1, 4 or 6 by
+# half a turn or more, so within this of the stated quarter it is the stated solution.
 QUARTER = np.pi / 2
 
 

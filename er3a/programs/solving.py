@@ -102,7 +102,7 @@ def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals, quarters_o
     not checked.
     """
     in_quarters = np.isfinite(branch.ranges).all(axis=1)
-    for beside in (np.zeros(len(in_quarters)), np.where(in_quarters, quarters_off, AT_A_CHANGE)):
+    for beside in (np.zeros(len(branch.ranges)), np.where(in_quarters, quarters_off, AT_A_CHANGE)):
         within = (rows >= branch.ranges[:, 0] - beside) & (rows <= branch.ranges[:, 1] + beside)
         met: Flags = np.asarray(within.all(axis=1), np.bool_)
         if met.any():
