@@ -60,6 +60,9 @@ CHUNK = 4_000  # points whose bodies are placed at a time
 MOST_TOUCHING = 200  # points of a motion at which depths are measured
 HALVINGS = 5  # of the part of a way in which bodies touch first
 CORNER_POINTS = 9
+# A line goes to the nearest configuration, whatever its target states. A pose's other solutions turn axis 1, 4 or 6 by
+# half a turn or more, so within this of the stated quarter it is the stated solution.
+QUARTER = np.pi / 2
 
 
 @dataclass(eq=False)
@@ -144,7 +147,9 @@ class Judge:
             self.motions[key] = checked = self._checked(motion, before)
             checked.guessed = before is not None and _rounded(before) in self._guessed
             chosen = motion.kind != "joint" or isinstance(motion.target, PoseTarget)
-            first = any(is_one(each, "configuration_guessed") for each in checked.findings)
+            followed = motion.kind != "joint" and before is not None  # ends where its way leads
+            guesses = ("configuration_guessed",) if followed else ("configuration_guessed", "configuration_not_met")
+            first = any(each.code in guesses for each in checked.findings)
             if checked.end is not None and (first or (checked.guessed and chosen)):
                 self._guessed.add(_rounded(checked.end))
         return self.motions[key]
@@ -247,7 +252,8 @@ class Judge:
         if given is not None and (other := arrives_otherwise(found, given)) is not None:
             checked.add(other)
         branch = target.branch if isinstance(target, PoseTarget) else None
-        if branch is not None and found.end is not None and not solutions_meant(branch, arm, found.end[None])[0]:
+        ends = None if branch is None or found.end is None else solutions_meant(branch, arm, found.end[None], QUARTER)
+        if ends is not None and not ends[0]:
             checked.add(fact("configuration_not_met", text=_configuration(target)))
 
     def _via(self, checked: CheckedMotion) -> Reals | None:
@@ -285,6 +291,9 @@ class Judge:
         rows, _ = equivalents_within(checked.arm, rows, reference)
         if (checked.motion.kind == "joint" or before is None) and target.branch is not None:
             rows, met = rows_meant(target.branch, checked.arm, pose, rows)
+            if not met:  # the stated solution all the same, if there is one
+                rows, met = rows_meant(target.branch, checked.arm, pose, rows, QUARTER)
+                met = met and checked.motion.kind != "joint"
             if not met:
                 checked.add(fact("configuration_not_met", text=_configuration(target)))
         away = np.abs(rows - reference).max(axis=1)

@@ -91,15 +91,18 @@ def _nearest(solutions: Reals, q: Reals) -> Reals | None:
     return found
 
 
-def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals) -> Flags:
+def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals, quarters_off: float = AT_A_CHANGE) -> Flags:
     """Which of joint vectors (k, n) in rad, solutions of one target, are meant: (k,).
+
+    ``quarters_off`` (rad) is how far a joint may be from the quarter of a turn that is stated for it.
 
     Where none is exactly, joints within ``AT_A_CHANGE`` of where their sign or quarter changes belong to both sides:
     the program rounds its numbers, and no arm is exactly as its table. The wrist centre's sides are compared with those
     in the arm's zero pose; what has no side there, or has no such sides at all, as an arm without a spherical wrist, is
     not checked.
     """
-    for beside in (0.0, AT_A_CHANGE):
+    in_quarters = np.isfinite(branch.ranges).all(axis=1)
+    for beside in (np.zeros(len(branch.ranges)), np.where(in_quarters, quarters_off, AT_A_CHANGE)):
         within = (rows >= branch.ranges[:, 0] - beside) & (rows <= branch.ranges[:, 1] + beside)
         met: Flags = np.asarray(within.all(axis=1), np.bool_)
         if met.any():
@@ -117,13 +120,16 @@ def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals) -> Flags:
     return met
 
 
-def rows_meant(branch: MeantSolution, robot: Robot, pose: Reals, rows: Reals) -> tuple[Reals, bool]:
+def rows_meant(
+    branch: MeantSolution, robot: Robot, pose: Reals, rows: Reals, quarters_off: float = AT_A_CHANGE
+) -> tuple[Reals, bool]:
     """The solutions of a pose that are meant.
 
     Parameters
     ----------
     pose : (4, 4), T_world_tool, m
     rows : (k, n), rad or m, its solutions
+    quarters_off : as of :func:`solutions_meant`
 
     Returns
     -------
@@ -135,14 +141,14 @@ def rows_meant(branch: MeantSolution, robot: Robot, pose: Reals, rows: Reals) ->
     such a pose by its last digit, and one solution is left of all. So joints turn against each other, too, in the
     direction that moves the tool least, as long as the pose stays the same but for those digits.
     """
-    met = solutions_meant(branch, robot, rows)
+    met = solutions_meant(branch, robot, rows, quarters_off)
     if not met.any():
         least = np.linalg.svd(jacobian(robot, rows))[2][:, -1]
         turns = TURNS[:, None, None] * least / np.abs(least).max(axis=1, keepdims=True)
         turned = (rows + turns).reshape(-1, robot.joints)
         stays = np.abs(forward(robot, turned) - pose).max(axis=(1, 2)) < ROUNDED
         turned = turned[stays & within(robot, turned)]
-        if len(turned) and (met := solutions_meant(branch, robot, turned)).any():
+        if len(turned) and (met := solutions_meant(branch, robot, turned, quarters_off)).any():
             rows = turned
     return (rows[met], True) if met.any() else (rows, False)
 

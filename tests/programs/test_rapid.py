@@ -384,7 +384,8 @@ def test_a_line_that_arrives_in_another_configuration_is_named(tmp_path):
     turn = ",".join(f"{each:.12f}" for each in Rotation.from_matrix(end[:3, :3]).as_quat()[[3, 0, 1, 2]])
     xyz = ",".join(f"{each * 1000 + (10 if i == 2 else 0):.9f}" for i, each in enumerate(end[:3, 3]))
     joints = ",".join(f"{each:.9f}" for each in np.degrees(q))
-    for conf, setting, named in (("0,0,0,1", "", False), ("-3,0,0,1", "", True), ("-3,0,0,1", "ConfL\\Off;", False)):
+    stated = (("0,0,0,1", "", False), ("-1,0,-1,1", "", False), ("0,0,0,0", "", True), ("0,0,4,1", "", True))
+    for conf, setting, named in (*stated, ("-3,0,0,1", "", True), ("-3,0,0,1", "ConfL\\Off;", False)):
         body = f"MoveAbsJ [[{joints}],{NONE}],@; {setting} MoveL [[{xyz}],[{turn}],[{conf}],{NONE}],@;"
         check = check_program(read_program(saved(tmp_path, body)), ROBOT, CheckOptions(start=q))
         assert ("configuration_not_met" in {each.finding.code for each in check.findings}) == named

@@ -406,6 +406,4 @@ def _of_values(name: str, values: list[Value]) -> Value | None:
             found[:3, :3] = a[:3, :3] @ turn
             known = sign > 0 or np.allclose(found[:3, :3], turn @ a[:3, :3], rtol=0, atol=SAME_TURN)
             return _record(found) if known else None  # in which frame a difference turns is not documented
-        case "point_dist" if len(poses) == 2:
-            return float(np.linalg.norm(poses[0][:3, 3] - poses[1][:3, 3]))
     return None
