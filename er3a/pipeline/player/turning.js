@@ -3,7 +3,7 @@
  * and leaves layers out.
  */
 
-import { add, scaled, subtract } from "er3a/algebra";
+import { add, column, scaled, subtract } from "er3a/algebra";
 import { Space, surface } from "er3a/space";
 import three from "er3a/three";
 
@@ -17,14 +17,32 @@ const [canvas, key, knife] = ["canvas", ".key", ".cut"].map((name) => place.quer
 const [low, high] = data.box.map((corner) => scaled(corner, 1e-3)); // m
 const size = subtract(high, low);
 const middle = scaled(add(low, high), 0.5);
-const left = new Set(data.layers.filter(({ shades }) => shades).map(({ name }) => name)); // names of what is not shown
+const left = new Set(); // names of what is not shown
 let awaited = false;
 
 const space = new Space(canvas, middle, data.filled * Math.hypot(...size), refresh);
 const plane = new three.Plane(new three.Vector3(0, 1, 0));
-const solids = data.solids.map(({ name, shapes, poses, colour }) => ({ name, colour, poses, parts: space.add(shapes) }));
+const solids = data.solids.map((each) => ({ ...each, parts: space.add(each.shapes) }));
 const layers = data.layers.map(made);
+const whole = space.distance;
 Object.assign(space, { azimuth: data.azimuth, elevation: data.elevation });
+
+const all = [...layers, ...solids];
+const named = (name) => all.find(({ address }) => address && address === name);
+const chosen = () => named(location.hash.slice(1)) ?? named("tray-1");
+
+/** The middle of a layer, or the top of solids. */
+function placeOf({ points, shapes }) {
+  if (points) return scaled(points.reduce(add), 1 / points.length);
+  return add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
+}
+
+/** Turns the picture until what the address names is before the rest, and comes nearer. */
+function face() {
+  const [x, y] = subtract(placeOf(chosen()), middle);
+  Object.assign(space, { azimuth: Math.hypot(x, y) < 0.1 * size[0] ? data.azimuth : Math.atan2(y, x) + 0.35, distance: 0.8 * whole, elevation: 0.35 });
+  refresh();
+}
 
 function bytes(text) {
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -45,12 +63,10 @@ function made(layer) {
   return { ...layer, points, parts };
 }
 
-function cloud({ shades, colour, width, cut }, points) {
-  const shade = shades ? [...bytes(shades)].map((step) => data.palette[step]) : points.map(() => colour);
+function cloud({ colour, width, cut }, points) {
   const geometry = new three.BufferGeometry();
   geometry.setAttribute("position", new three.Float32BufferAttribute(points.flat(), 3));
-  geometry.setAttribute("color", new three.Float32BufferAttribute(shade.flatMap((css) => new three.Color(css).toArray()), 3));
-  const look = { size: width, sizeAttenuation: false, vertexColors: true, clippingPlanes: cut ? [plane] : [] };
+  const look = { color: colour, size: width, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] };
   return [new three.Points(geometry, new three.PointsMaterial(look))];
 }
 
@@ -81,14 +97,14 @@ function draw() {
   plane.constant = -at;
   space.begin();
   box();
-  for (const { name, points, faces, parts, cut } of layers) {
-    for (const part of parts) part.visible = !left.has(name);
-    if (faces && !cut && !left.has(name)) space.word(name, scaled(points.reduce(add), 1 / points.length), space.page.ink, false);
+  const shown = chosen();
+  for (const { name, parts } of all) for (const part of parts) part.visible = !left.has(name);
+  for (const each of solids.filter(({ name }) => !left.has(name))) {
+    const hiding = each.poses.length === 1 ? space.hiding(each.parts, solids[0].poses) : new Set();
+    space.place(each.parts, each.poses, new Map(), (part) => hiding.has(part) || (each.address && each !== shown));
   }
-  for (const { name, parts, poses } of solids) {
-    const hiding = poses.length === 1 ? space.hiding(parts, solids[0].poses) : new Set();
-    space.place(parts, poses, new Map(), (part) => hiding.has(part));
-    for (const part of parts) part.visible = !left.has(name);
+  for (const each of all.filter(({ name, address }) => address && !left.has(name))) {
+    space.word(each.name, placeOf(each), each === shown ? space.page.accent : space.page.ink, each === shown);
   }
   space.end();
   place.toggleAttribute("data-drawn", true);
@@ -128,7 +144,7 @@ function ticksOf(from, to) {
 }
 
 // The names of what is seen, each with its colour and a box to leave it out.
-for (const { name, shades, colour } of [...layers, ...solids]) {
+for (const { name, colour } of all) {
   const [label, check, swatch] = ["label", "input", "i"].map((tag) => document.createElement(tag));
   Object.assign(check, { type: "checkbox", checked: !left.has(name) });
   check.addEventListener("change", () => {
@@ -136,12 +152,12 @@ for (const { name, shades, colour } of [...layers, ...solids]) {
     else left.add(name);
     refresh();
   });
-  swatch.style.background = shades ? data.palette.at(-1) : colour;
+  swatch.style.background = colour;
   label.append(check, swatch, ` ${name}`);
   key.append(label);
 }
 
 knife.addEventListener("input", refresh);
-place.querySelector(".colours")?.style.setProperty("background", `linear-gradient(to right, ${data.palette.join(", ")})`);
+addEventListener("hashchange", () => named(location.hash.slice(1)) && face());
 refresh();
 performance.mark("turning");
