@@ -100,7 +100,8 @@ def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals,
     middle_rho, middle_z, middle_azimuth = ((edge[1:] + edge[:-1]) / 2 for edge in (rho, z, azimuth))
     at_rho, at_azimuth = np.meshgrid(middle_rho, np.degrees(middle_azimuth), indexing="ij")
     filled = np.stack([_filled(proof, at_rho, at_azimuth, height) for height in middle_z], axis=1)
-    points, faces = surface_of(Blocks(rho, z, azimuth, 1.0 - filled, 1.0 - filled, frame.bar), filled)
+    empty = 1.0 - filled.astype(float)
+    points, faces = surface_of(Blocks(rho, z, azimuth, empty, empty, frame.bar), filled)
     return _smoothed(points, faces) @ frame.R + frame.origin, faces
 
 
