@@ -1,6 +1,6 @@
 /**
- * A figure in space: layers of points and surfaces in a box with ticks in mm, among solids. A reader turns it, cuts it open,
- * and leaves layers out.
+ * A figure in space: layers of points and surfaces among solids, over a floor. A reader turns it, cuts it open, and leaves
+ * layers out.
  */
 
 import { add, column, scaled, subtract } from "er3a/algebra";
@@ -8,7 +8,7 @@ import { Space, surface } from "er3a/space";
 import three from "er3a/three";
 
 const STEPS = 65535; // that the box is divided into
-const TICKS = 6; // at most, along an edge
+const FLOOR = 14; // lines of the floor, along what is seen
 const THROUGH = { transparent: true, depthWrite: false, side: three.DoubleSide };
 
 const place = document.getElementById("turning");
@@ -96,7 +96,7 @@ function draw() {
   const at = low[1] + (Number(knife.value) / Number(knife.max)) * size[1];
   plane.constant = -at;
   space.begin();
-  box();
+  space.floor(middle, size[0] / FLOOR, 0);
   const shown = chosen();
   for (const { name, parts } of all) for (const part of parts) part.visible = !left.has(name);
   for (const each of solids.filter(({ name }) => !left.has(name))) {
@@ -108,39 +108,6 @@ function draw() {
   }
   space.end();
   place.toggleAttribute("data-drawn", true);
-}
-
-/** The three far sides of the box, with lines at round numbers of mm, and the numbers along three edges. */
-function box() {
-  const eye = space.eye.position;
-  const back = low.map((_, k) => (eye[k] > middle[k] ? low[k] : high[k]));
-  const front = low.map((_, k) => low[k] + high[k] - back[k]);
-  const ticks = low.map((_, k) => ticksOf(1000 * low[k], 1000 * high[k]));
-  const at = (k, value, others) => others.map((other, n) => (n === k ? value : other));
-  const pairs = [];
-  for (const k of [0, 1, 2]) {
-    for (const value of [low[k], ...ticks[k].map((tick) => tick / 1000), high[k]]) {
-      for (const other of [0, 1, 2].filter((n) => n !== k)) {
-        pairs.push(...[low, high].flatMap((end) => at(k, value, back.map((side, n) => (n === other ? end[n] : side)))));
-      }
-    }
-  }
-  space.segments(pairs, space.page.grid, 1, false);
-  const edges = [at(1, front[1], back), at(0, front[0], back), at(0, front[0], back)];
-  edges.forEach((edge, k) => {
-    const away = scaled(subtract(edge, at(k, edge[k], middle)), 0.06);
-    for (const value of ticks[k]) space.word(String(value), add(at(k, value / 1000, edge), at(k, 0, away)), space.page.ink, false);
-    space.word(`${"xyz"[k]} (mm)`, add(at(k, middle[k], edge), at(k, 0, scaled(away, 3))));
-  });
-}
-
-function ticksOf(from, to) {
-  const rough = (to - from) / TICKS;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough);
-  const ticks = [];
-  for (let value = Math.ceil(from / step) * step; value <= to; value += step) ticks.push(Math.round(value));
-  return ticks;
 }
 
 // The names of what is seen, each with its colour and a box to leave it out.
