@@ -103,7 +103,7 @@ function draw() {
     const hiding = each.poses.length === 1 ? space.hiding(each.parts, solids[0].poses) : new Set();
     space.place(each.parts, each.poses, new Map(), (part) => hiding.has(part) || (each.address && each !== shown));
   }
-  for (const each of all.filter(({ name, address }) => address && !left.has(name))) {
+  for (const each of all.filter(({ name, address }) => address && !left.has(name)).sort((a, b) => (b === shown) - (a === shown))) {
     space.word(each.name, placeOf(each), each === shown ? space.page.accent : space.page.ink, each === shown);
   }
   space.end();

@@ -72,7 +72,7 @@ def surroundings(robot: Robot, scene: Scene | None) -> list[Solids]:
 
 
 AZIMUTH_DEG, ELEVATION_DEG = -65.0, 15.0  # from where a figure is seen at first
-FILLED = 0.37  # of the distance that holds the box's diagonal
+FILLED = 0.32  # of the distance that holds the box's diagonal
 
 
 def turning_figure(
