@@ -3,7 +3,7 @@
 import { multiply, rotX, rotY, rotZ, translation } from "er3a/algebra";
 import { jointsFor } from "er3a/goal";
 import { write } from "er3a/readouts";
-import { fill, fixed, inDegrees, inMillimetres, meant, plain, shown, toRadians } from "er3a/text";
+import { fill, fixed, inDegrees, inMillimetres, meant, plain, shown, toDegrees, toRadians } from "er3a/text";
 
 const SPEED = 30; // deg/s on the mean of a move, of the joint that takes longest
 const SLIDE_SPEED = 150; // mm/s

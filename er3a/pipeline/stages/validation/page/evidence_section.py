@@ -100,7 +100,7 @@ def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
     and the place on the page that says how; all of it where no document speaks of the table."""
     left = [each for each in evidence.entries if each.entry in evidence.unconfirmed] if evidence else []
     steps = (
-        (N_("Jog each joint: does it turn as drawn?"), ("direction",), "cell-direction1"),
+        (N_("Jog each joint: turns as drawn?"), ("direction",), "cell-direction1"),
         (N_("Read five poses, for {names}"), (*CONTINUOUS, "beta"), "poses"),
         (N_("Enter limits and speeds from the controller"), LIMITS, "cell-lower1"),
     )
