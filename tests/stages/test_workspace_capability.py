@@ -156,7 +156,7 @@ def test_no_place_is_no_error():
     done = tool_capability(load_robot("er3_600"), settings(placement={"box_mm": [2000.0, 2000.0, 100.0]}), 0.15)
     assert done.placement.places == ()
     context = context_of(load_robot("er3_600"), done)
-    assert context["place_rows"] == []
+    assert context["tray_rows"] == []
     (nowhere,) = _assumed(done)
     assert (nowhere.reason, nowhere.names) == ("tray_nowhere", ("2000 × 2000 × 100 mm",))
     assert "no place for the tray was found" in assumed_text(nowhere)

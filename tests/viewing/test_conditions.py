@@ -26,7 +26,7 @@ from er3a.pipeline.stages.vision.model import PathRows, VisionResults
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.page import tray
-from er3a.pipeline.stages.workspace.page.capability_section import place_row, tray_rows
+from er3a.pipeline.stages.workspace.page.capability_section import tray_rows
 from er3a.pipeline.stages.workspace.page.tray import Meeting, first_inside, placing
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
 
@@ -300,16 +300,12 @@ def test_links_of_grasps_that_meet_the_tray_are_found_before_the_tool_point():
 GRASPED = {"can": "grasped", "missed": "not graspable"}
 
 
-def test_the_workspace_page_says_how_far_a_tray_can_be_moved():
+def test_the_workspace_page_says_where_a_tray_stands_and_what_to_do_first():
     results = placed().results
-    placement = results.summary.placement
-    spot = replace(placement.best, room_down_m=(0.075, 0.2, 0.2), room_up_m=(0.075, 0.175, 0.05))
-    results.summary = SimpleNamespace(placement=replace(placement, places=(spot,)), assumed=[Open("tool")])
+    results.summary = SimpleNamespace(placement=results.summary.placement, assumed=[Open("tool")])
     results.places = None
     found = placing({"workspace": SimpleNamespace(results=results)}, load_robot("er3a_c60"), {}, {})
     rows = dict(tray_rows(found, results, results.summary.placement, "At most 2 kg."))
-    cells = place_row("best", spot, SimpleNamespace(arm_angles=1, named_branches=True))
-    assert cells[-1] == "x ±75, y −200 to 175, z −200 to 50"
     assert rows["Payload there"] == "At most 2 kg."
     assert rows["Place"].startswith("In the air: no surface is known there, centre (350, 0, 400) mm")
     assert "scene file as boxes, and run again" in rows["What to do first"]

@@ -103,7 +103,7 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     if placing is None:
         return None
     robot, results = study.robot(name), stored["workspace"].results
-    drawing = from_above(robot, results, study.scene(name, "capability"), [placing.tray], LETTERS)
+    drawing = from_above(robot, results, study.scene(name, "capability"), placing.tray, LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     carried, _ = payload_key(known, robot)
     answer = tr("Centre at {centre} mm.", centre=millimetres(placing.tray.place.centre_m))

@@ -120,7 +120,7 @@ function draw() {
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  others.forEach((own, k) => sticks(own, data.solutions[k], poses[0]));
+  others.forEach((own, k) => sticks(own, data.solutions[k], poses[0], others.length > 1 ? String(k + 1) : ""));
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
@@ -155,12 +155,14 @@ function draw() {
   space.end();
 }
 
-/** An arm as lines between its joints, which hide nothing; its joints where those of the arm that is shown are not. */
-function sticks(poses, css, shown) {
+/** An arm as lines between its joints, which hide nothing; its joints where those of the arm that is shown are not, and its number. */
+function sticks(poses, css, shown, number) {
   const joints = poses.map((T) => column(T, 3));
   const off = joints.filter((joint, k) => Math.hypot(...subtract(joint, column(shown[k], 3))) > CLOSED * data.size);
   if (off.length) space.line(joints, css, 4);
   off.forEach((joint) => space.dot(joint, css, 4.5));
+  const away = (joint) => Math.min(...shown.map((T) => Math.hypot(...subtract(joint, column(T, 3)))));
+  if (number && off.length) space.word(number, off.reduce((a, b) => (away(b) > away(a) ? b : a)), space.page.muted, false);
 }
 
 /** The axis of row `j`, whose frame is `T`, through the whole picture. */

@@ -1,14 +1,14 @@
 /**
- * A figure in space: layers of points and surfaces in a box with ticks in mm, among solids. A reader turns it, cuts it open,
- * and leaves layers out.
+ * A figure in space: layers of points and surfaces among solids, over a floor. A reader turns it, cuts it open, and leaves
+ * layers out.
  */
 
-import { add, scaled, subtract } from "er3a/algebra";
+import { add, column, scaled, subtract } from "er3a/algebra";
 import { Space, surface } from "er3a/space";
 import three from "er3a/three";
 
 const STEPS = 65535; // that the box is divided into
-const TICKS = 6; // at most, along an edge
+const FLOOR = 14; // lines of the floor, along what is seen
 const THROUGH = { transparent: true, depthWrite: false, side: three.DoubleSide };
 
 const place = document.getElementById("turning");
@@ -17,14 +17,32 @@ const [canvas, key, knife] = ["canvas", ".key", ".cut"].map((name) => place.quer
 const [low, high] = data.box.map((corner) => scaled(corner, 1e-3)); // m
 const size = subtract(high, low);
 const middle = scaled(add(low, high), 0.5);
-const left = new Set(data.layers.filter(({ shades }) => shades).map(({ name }) => name)); // names of what is not shown
+const left = new Set(); // names of what is not shown
 let awaited = false;
 
 const space = new Space(canvas, middle, data.filled * Math.hypot(...size), refresh);
 const plane = new three.Plane(new three.Vector3(0, 1, 0));
-const solids = data.solids.map(({ name, shapes, poses, colour }) => ({ name, colour, poses, parts: space.add(shapes) }));
+const solids = data.solids.map((each) => ({ ...each, parts: space.add(each.shapes) }));
 const layers = data.layers.map(made);
+const whole = space.distance;
 Object.assign(space, { azimuth: data.azimuth, elevation: data.elevation });
+
+const all = [...layers, ...solids];
+const named = (name) => all.find(({ address }) => address && address === name);
+const chosen = () => named(location.hash.slice(1)) ?? named("tray-1");
+
+/** The middle of a layer, or the top of solids. */
+function placeOf({ points, shapes }) {
+  if (points) return scaled(points.reduce(add), 1 / points.length);
+  return add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
+}
+
+/** Turns the picture until what the address names is before the rest, and comes nearer. */
+function face() {
+  const [x, y] = subtract(placeOf(chosen()), middle);
+  Object.assign(space, { azimuth: Math.hypot(x, y) < 0.1 * size[0] ? data.azimuth : Math.atan2(y, x) + 0.35, distance: 0.8 * whole, elevation: 0.35 });
+  refresh();
+}
 
 function bytes(text) {
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -45,12 +63,10 @@ function made(layer) {
   return { ...layer, points, parts };
 }
 
-function cloud({ shades, colour, width, cut }, points) {
-  const shade = shades ? [...bytes(shades)].map((step) => data.palette[step]) : points.map(() => colour);
+function cloud({ colour, width, cut }, points) {
   const geometry = new three.BufferGeometry();
   geometry.setAttribute("position", new three.Float32BufferAttribute(points.flat(), 3));
-  geometry.setAttribute("color", new three.Float32BufferAttribute(shade.flatMap((css) => new three.Color(css).toArray()), 3));
-  const look = { size: width, sizeAttenuation: false, vertexColors: true, clippingPlanes: cut ? [plane] : [] };
+  const look = { color: colour, size: width, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] };
   return [new three.Points(geometry, new three.PointsMaterial(look))];
 }
 
@@ -80,55 +96,22 @@ function draw() {
   const at = low[1] + (Number(knife.value) / Number(knife.max)) * size[1];
   plane.constant = -at;
   space.begin();
-  box();
-  for (const { name, points, faces, parts, cut } of layers) {
-    for (const part of parts) part.visible = !left.has(name);
-    if (faces && !cut && !left.has(name)) space.word(name, scaled(points.reduce(add), 1 / points.length), space.page.ink, false);
+  space.floor(middle, size[0] / FLOOR, 0);
+  const shown = chosen();
+  for (const { name, parts } of all) for (const part of parts) part.visible = !left.has(name);
+  for (const each of solids.filter(({ name }) => !left.has(name))) {
+    const hiding = each.poses.length === 1 ? space.hiding(each.parts, solids[0].poses) : new Set();
+    space.place(each.parts, each.poses, new Map(), (part) => hiding.has(part) || (each.address && each !== shown));
   }
-  for (const { name, parts, poses } of solids) {
-    const hiding = poses.length === 1 ? space.hiding(parts, solids[0].poses) : new Set();
-    space.place(parts, poses, new Map(), (part) => hiding.has(part));
-    for (const part of parts) part.visible = !left.has(name);
+  for (const each of all.filter(({ name, address }) => address && !left.has(name)).sort((a, b) => (b === shown) - (a === shown))) {
+    space.word(each.name, placeOf(each), each === shown ? space.page.accent : space.page.ink, each === shown);
   }
   space.end();
   place.toggleAttribute("data-drawn", true);
 }
 
-/** The three far sides of the box, with lines at round numbers of mm, and the numbers along three edges. */
-function box() {
-  const eye = space.eye.position;
-  const back = low.map((_, k) => (eye[k] > middle[k] ? low[k] : high[k]));
-  const front = low.map((_, k) => low[k] + high[k] - back[k]);
-  const ticks = low.map((_, k) => ticksOf(1000 * low[k], 1000 * high[k]));
-  const at = (k, value, others) => others.map((other, n) => (n === k ? value : other));
-  const pairs = [];
-  for (const k of [0, 1, 2]) {
-    for (const value of [low[k], ...ticks[k].map((tick) => tick / 1000), high[k]]) {
-      for (const other of [0, 1, 2].filter((n) => n !== k)) {
-        pairs.push(...[low, high].flatMap((end) => at(k, value, back.map((side, n) => (n === other ? end[n] : side)))));
-      }
-    }
-  }
-  space.segments(pairs, space.page.grid, 1, false);
-  const edges = [at(1, front[1], back), at(0, front[0], back), at(0, front[0], back)];
-  edges.forEach((edge, k) => {
-    const away = scaled(subtract(edge, at(k, edge[k], middle)), 0.06);
-    for (const value of ticks[k]) space.word(String(value), add(at(k, value / 1000, edge), at(k, 0, away)), space.page.ink, false);
-    space.word(`${"xyz"[k]} (mm)`, add(at(k, middle[k], edge), at(k, 0, scaled(away, 3))));
-  });
-}
-
-function ticksOf(from, to) {
-  const rough = (to - from) / TICKS;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough);
-  const ticks = [];
-  for (let value = Math.ceil(from / step) * step; value <= to; value += step) ticks.push(Math.round(value));
-  return ticks;
-}
-
 // The names of what is seen, each with its colour and a box to leave it out.
-for (const { name, shades, colour } of [...layers, ...solids]) {
+for (const { name, colour } of all) {
   const [label, check, swatch] = ["label", "input", "i"].map((tag) => document.createElement(tag));
   Object.assign(check, { type: "checkbox", checked: !left.has(name) });
   check.addEventListener("change", () => {
@@ -136,12 +119,12 @@ for (const { name, shades, colour } of [...layers, ...solids]) {
     else left.add(name);
     refresh();
   });
-  swatch.style.background = shades ? data.palette.at(-1) : colour;
+  swatch.style.background = colour;
   label.append(check, swatch, ` ${name}`);
   key.append(label);
 }
 
 knife.addEventListener("input", refresh);
-place.querySelector(".colours")?.style.setProperty("background", `linear-gradient(to right, ${data.palette.join(", ")})`);
+addEventListener("hashchange", () => named(location.hash.slice(1)) && face());
 refresh();
 performance.mark("turning");

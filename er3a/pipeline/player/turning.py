@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 
 from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Integers, Reals
@@ -24,8 +22,6 @@ from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
 STEPS = 65_535  # that the box around everything is divided into
-SHADES = 64
-DARKEST = 0.33  # of a scale of colours, which is still seen on a dark page
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,27 +34,18 @@ class Layer:
     points_mm : (N, 3)
     colour : ``#rrggbb``
     width : px, of the squares at the points of what is no surface
-    shade : (N,) in 0..1, a place in the scale of colours, instead of ``colour``; none for surfaces
     faces : (M, 3), points of each triangle of a surface, counter-clockwise from outside
     cut : whether the plane that a reader moves cuts it open
+    address : by which a list leads to it
     """
 
     name: str
     points_mm: Reals
     colour: str = INK
     width: float = 2.0
-    shade: Reals | None = None
     faces: Integers | None = None
     cut: bool = False
-
-
-@dataclass(frozen=True)
-class ColourScale:
-    """What colours mean: a Matplotlib colour map, a title, and texts at places in 0..1."""
-
-    colours: str
-    title: str
-    ticks: Sequence[tuple[float, str]]
+    address: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +59,7 @@ class Solids:
     shapes: Sequence[dict[str, Any]]
     poses: Reals
     colour: str
+    address: str = ""
 
 
 def surroundings(robot: Robot, scene: Scene | None) -> list[Solids]:
@@ -84,12 +72,11 @@ def surroundings(robot: Robot, scene: Scene | None) -> list[Solids]:
 
 
 AZIMUTH_DEG, ELEVATION_DEG = -65.0, 15.0  # from where a figure is seen at first
-FILLED = 0.39  # of the distance that holds the box's diagonal
+FILLED = 0.32  # of the distance that holds the box's diagonal
 
 
 def turning_figure(
     layers: Sequence[Layer],
-    scale: ColourScale | None = None,
     solids: Sequence[Solids] = (),
     cut_m: float | None = None,
 ) -> Markup:
@@ -104,24 +91,19 @@ def turning_figure(
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(low[2], 0.0)
     low, high = low - 50.0, high + 50.0
-    shades = colormaps[scale.colours](np.linspace(DARKEST, 1, SHADES)) if scale else ()
     data = {
         "box": [low.tolist(), high.tolist()],
         "azimuth": float(np.radians(AZIMUTH_DEG)),
         "elevation": float(np.radians(ELEVATION_DEG)),
         "filled": FILLED,
-        "palette": [to_hex(colour) for colour in shades],
         "cut": 0.5 if cut_m is None else float((1000 * cut_m - low[1]) / (high[1] - low[1])),
-        "solids": [
-            {"name": s.name, "shapes": list(s.shapes), "poses": s.poses.tolist(), "colour": s.colour} for s in solids
-        ],
+        "solids": [{**vars(each), "shapes": list(each.shapes), "poses": each.poses.tolist()} for each in solids],
         "layers": [_layer(layer, low, high) for layer in layers],
     }
     return Markup(
         page_environment(_HERE)
         .get_template("turning.html.j2")
         .render(
-            scale=scale,
             cut=data["cut"],
             data=data,
             still=_still(layers, solids, data),
@@ -146,11 +128,7 @@ def _still(layers: Sequence[Layer], solids: Sequence[Solids], data: dict[str, An
                 points, layer.faces[behind[layer.faces].all(axis=1)], layer.colour, 0.3 if layer.cut else 1.0
             )
         else:
-            shades = np.zeros(len(points)) if layer.shade is None else (SHADES - 1) * layer.shade
-            palette = [layer.colour] if layer.shade is None else data["palette"]
-            steps = np.rint(shades).clip(0, SHADES - 1).astype(int)
-            colours = np.array([rgb(each) for each in palette])[steps] / 255
-            picture.points(points[behind], colours[behind], layer.width)
+            picture.points(points[behind], np.tile(rgb(layer.colour), (behind.sum(), 1)) / 255, layer.width)
     return picture.markup()
 
 
@@ -162,9 +140,8 @@ def _layer(layer: Layer, low: Reals, high: Reals) -> dict[str, Any]:
         "colour": layer.colour,
         "width": layer.width,
         "cut": layer.cut,
+        "address": layer.address,
     }
-    if layer.shade is not None:
-        packed["shades"] = _packed(np.clip(layer.shade, 0, 1) * (SHADES - 1), "u1")
     if layer.faces is not None:
         packed["faces"] = _packed(layer.faces, "<u4")
     return packed

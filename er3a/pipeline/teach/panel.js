@@ -145,9 +145,7 @@ for (const button of document.querySelectorAll("[data-view]")) {
 byId("zoom-in").addEventListener("click", () => view.zoom(1 / 1.25));
 byId("zoom-out").addEventListener("click", () => view.zoom(1.25));
 byId("frames").addEventListener("change", refresh);
-for (const choice of document.querySelectorAll("input[name=orientation]")) {
-  choice.addEventListener("change", refresh);
-}
+byId("pose-form").addEventListener("focusout", refresh);
 
 async function copy(text, copied) {
   let message = words.not_copied;

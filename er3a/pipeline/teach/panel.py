@@ -108,16 +108,13 @@ WORDS: dict[str, Any] = {
     "go_to_point": N_("go to point {number}"),
     "remove_point": N_("remove point {number}"),
     "pose": N_("Tool pose"),
-    "position": N_("Position"),
-    "orientation": N_("Orientation as"),
+    "orientation": N_("Other forms"),
     "orientations": {
-        "rpy": N_("Roll, pitch, yaw (ZYX)"),
         "zyz": N_("Euler angles ZYZ"),
         "quaternion": N_("Quaternion"),
         "matrix": N_("Matrix"),
     },
     "parts": {
-        "rpy": [N_("roll about X"), N_("pitch about Y"), N_("yaw about Z")],
         "zyz": [N_("φ about Z"), N_("ϑ about Y"), N_("ψ about Z")],
         "quaternion": ["w", "x", "y", "z"],
     },

@@ -2,7 +2,7 @@
 
 import { column, eulerZYZ, quaternion, rollPitchYaw } from "er3a/algebra";
 import { conditioning, determinantFactors } from "er3a/kinematics";
-import { fill, fixed, inDegrees, inMillimetres, significant } from "er3a/text";
+import { fill, fixed, inDegrees, inMillimetres, significant, toDegrees } from "er3a/text";
 
 const MET = { wrist: 1e-6, elbow: 1e-6, shoulder: 1e-6 }; // rad, rad, m: so near counts as singular
 const SHOWN = { wrist: inDegrees, elbow: inDegrees, shoulder: inMillimetres };
@@ -14,19 +14,17 @@ export function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** Writes a pose in the representation that is chosen on the page. */
+/** Writes a pose in all its forms; into the fields where nobody types another. */
 export function showPose(T) {
-  column(T, 3).forEach((value, i) => write(byId(`position-${"xyz"[i]}`), fixed(1000 * value, 2)));
-  const chosen = document.querySelector("input[name=orientation]:checked").value;
-  for (const part of document.querySelectorAll(".orientation")) part.hidden = part.id !== `orientation-${chosen}`;
-  const values = {
-    rpy: () => rollPitchYaw(T).map((angle) => inDegrees(angle, 3)),
-    zyz: () => eulerZYZ(T).map((angle) => inDegrees(angle, 3)),
-    quaternion: () => quaternion(T).map((value) => fixed(value, 6)),
-    matrix: () => T.flatMap((row, r) => row.map((value, c) => (c < 3 || r === 3 ? fixed(value, 6) : fixed(1000 * value, 2)))),
-  }[chosen]();
-  const cells = byId(`orientation-${chosen}`).querySelectorAll(".value");
-  values.forEach((text, i) => write(cells[i], text));
+  const form = byId("pose-form");
+  const numbers = [...column(T, 3).map((value) => 1000 * value), ...rollPitchYaw(T).map(toDegrees)];
+  if (!form.matches(":focus-within")) form.querySelectorAll("input").forEach((field, i) => (field.value = String(Number(numbers[i].toFixed(3)) + 0)));
+  const forms = {
+    zyz: eulerZYZ(T).map((angle) => inDegrees(angle, 3)),
+    quaternion: quaternion(T).map((value) => fixed(value, 6)),
+    matrix: T.flatMap((row, r) => row.map((value, c) => (c < 3 || r === 3 ? fixed(value, 6) : fixed(1000 * value, 2)))),
+  };
+  for (const [kind, texts] of Object.entries(forms)) byId(`orientation-${kind}`).querySelectorAll(".value").forEach((cell, i) => write(cell, texts[i]));
 }
 
 /** Writes the measures at frames `T`, and the warning that names what is near. */

@@ -1,6 +1,6 @@
 /** What a person has the arm do beyond single joints: go to a typed pose, jog, and keep way points. */
 
-import { column, multiply, rollPitchYaw, rotX, rotY, rotZ, translation } from "er3a/algebra";
+import { multiply, rotX, rotY, rotZ, translation } from "er3a/algebra";
 import { jointsFor } from "er3a/goal";
 import { write } from "er3a/readouts";
 import { fill, fixed, inDegrees, inMillimetres, meant, plain, shown, toDegrees, toRadians } from "er3a/text";
@@ -39,12 +39,6 @@ function typePose(reach, arm, words) {
   const form = byId("pose-form");
   const fields = [...form.querySelectorAll("input")];
   const message = byId("pose-message");
-  const take = () => {
-    const T = arm.tool();
-    const values = [...column(T, 3).map((value) => 1000 * value), ...rollPitchYaw(T).map(toDegrees)];
-    fields.forEach((field, i) => (field.value = String(Number(values[i].toFixed(3)) + 0)));
-  };
-  byId("pose-take").addEventListener("click", take);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const values = fields.map((field) => field.valueAsNumber);
@@ -60,7 +54,6 @@ function typePose(reach, arm, words) {
     const typed = place.map((value) => Number((1000 * value).toFixed(3))).join(", ");
     write(message, `${message.textContent} ${fill(words.in_metres, { place: typed })}`.trim());
   });
-  take();
 }
 
 function jog(reach, arm, { words, table, joint_names: names }) {

@@ -58,10 +58,11 @@ class ListRow:
 
 @dataclass(frozen=True)
 class Group:
-    """Rows under one title."""
+    """Rows under one title, with how many they are where that is ``counted``."""
 
     title: str
     rows: Sequence[ListRow]
+    counted: bool = True
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,12 @@ from er3a.files.kept_files import sha256
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, own_title, tr, with_unit
-from er3a.pipeline.messages.comparison import HEADLINES, doubt_rows, layer_rows
+from er3a.pipeline.messages.comparison import HEADLINES, STATES, doubt_rows, layer_rows
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.answer import Group, ListRow, Mark
 from er3a.pipeline.viewing.side_view import UPRIGHT, Label, beyond, entry_places, flanges_off, seen_arm, side_view
 from er3a.robots.robot import Robot
 
@@ -48,6 +49,7 @@ def write_comparison(
     slips = found.units.causes if found.units else ()
     rows = [] if corrected is None else _rows(one[1], corrected)
     text = "" if corrected is None else robot_text(robot_file(corrected))
+    layers = [*doubt_rows(doubts), *layer_rows(found)]
     lengths, angles = (f"{value:g}" for value in tolerances)
     words = ["--tolerance-mm", lengths, "--tolerance-deg", angles, "--html", str(output)]
     files = [Path(name) for name, _ in (one, other) if Path(name).is_file()]
@@ -61,12 +63,19 @@ def write_comparison(
         headline=joined([*doubts, *map(say, (*slips, *found.causes)), word("comparison", HEADLINES, found.verdict)]),
         keys=_keys(found),
         seen=_seen(in_units(one[1], slips, "a"), in_units(other[1], slips, "b"), found, rows),
-        layers=[*doubt_rows(doubts), *layer_rows(found)],
+        layers=layers,
+        groups=[Group(tr("What agrees and what differs"), [_layer(*row) for row in layers], counted=False)],
         columns=[tr(label) for label in COLUMNS.values()],
         rows=rows,
         corrected=text,
         corrected_address=page.text_address(text),
     )
+
+
+def _layer(name: str, state: str, how: str) -> ListRow:
+    """A layer in the list at the picture's side."""
+    marks: dict[str, Mark] = {tr(STATES[True]): "pass", tr(STATES[False]): "fail"}
+    return ListRow(marks.get(state, "none"), name, how or state, "#layers-in-full")
 
 
 def _keys(found: Comparison) -> list[tuple[str, str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -12,7 +11,7 @@ from er3a.files.kept_files import sha256
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import own_title, with_unit
 from er3a.pipeline.messages.confirm import lines_of
-from er3a.pipeline.messages.numbers import number
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
@@ -36,6 +35,7 @@ def write_confirmation(
     command : that made it; files : what it was made from
     """
     _, headline, *lines = lines_of(found, nearest=nearest)
+    kind, said = headline.split(";")[0].split(": ")  # the key figures say the rest
     arms = [seen_arm(robot, own_title(robot.title), "model", "right" if found.verdict == "agrees" else "wrong")]
     if found.verdict not in ("agrees", "open"):
         arms.insert(0, seen_arm(found.corrected, "Controller", "", "right"))
@@ -46,7 +46,8 @@ def write_confirmation(
         provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest()),
         title=own_title(robot.title),
         status=STATUS.get(found.verdict, "caution"),
-        headline=re.split("[;；]", headline)[0],  # the key figures say the rest
+        kind=kind.lower(),
+        headline=said,
         lines=[headline, *(line.strip() for line in lines)],
         keys=_keys(found),
         arms=side_view(arms, ratio=UPRIGHT, labels=flanges_off(arms), column_mm=beyond(arms)),
@@ -57,7 +58,7 @@ def write_confirmation(
 def _keys(found: Confirmation) -> list[tuple[str, str]]:
     off = [found.before_mm.max(), found.left_mm[found.fits].max(initial=0.0)]
     words = "as it is, at worst", "explained, at worst"
-    return [(with_unit(number(float(value), 3), "mm"), said) for value, said in zip(off, words)]
+    return [(with_unit(fixed(float(value), 2), "mm"), said) for value, said in zip(off, words)]
 
 
 def _poses(found: Confirmation) -> Group:
@@ -65,9 +66,9 @@ def _poses(found: Confirmation) -> Group:
     shares = lengths(found.before_mm.tolist())
     rows = []
     for line, before, left, share in zip(found.lines, found.before_mm, found.left_mm, shares):
-        off = [with_unit(number(float(value), 2), "mm") for value in ((before, left) if found.layers else (left,))]
+        off = joined([fixed(float(value), 2) for value in ((before, left) if found.layers else (left,))], " → ")
         mark: Literal["pass", "caution", "fail"] = (
             "pass" if before <= found.digits_mm else "caution" if left <= found.digits_mm else "fail"
         )
-        rows.append(ListRow(mark, f"line {line}", joined(off, " → "), length=share, parts=[Part(0.0, 1.0, mark)]))
-    return Group("flange off", rows)
+        rows.append(ListRow(mark, str(line), with_unit(off, "mm"), length=share, parts=[Part(0.0, 1.0, mark)]))
+    return Group("flange off, by line of the file", rows)

@@ -734,6 +734,8 @@ for (const link of document.querySelectorAll("nav [data-stage]")) {
   link.classList.add(status);
 }
 
+document.querySelector("nav [aria-current]")?.scrollIntoView({ inline: "center", block: "nearest" }); // where the pages' names don't fit
+
 // The row of the list whose moment or picture is shown.
 const rows = [...document.querySelectorAll(".runs:not(.plain) a")];
 const fix = rows.some((row) => row.dataset.fix) && document.querySelector(".hero .fix"); // it follows the row

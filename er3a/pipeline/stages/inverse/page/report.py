@@ -29,10 +29,12 @@ from er3a.pipeline.stages.inverse.page.played import (
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 NO_BREAK_SPACE = "\u00a0"
 SAME = 1e-6  # deg or mm
+OVER = 0.12  # of a joint's way, beyond its limit, at most, where a joint is drawn that leaves it
 
 
 def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> None:
@@ -129,21 +131,25 @@ def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows)
         method="" if is_one(target.method, "closed_form") else say(target.method),
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
-        listed=_solutions_listed(target.name, branches, cells),
+        listed=_solutions_listed(robot, target.name, branches),
     )
 
 
 def _solutions_listed(
-    target: str, branches: model.SolutionRows, cells: Sequence[Sequence[str]]
-) -> list[tuple[str, Markup, Markup, str]]:
-    """The branches as they are listed by the player: mark, where it shows each, its name, and what came of it."""
+    robot: Robot, target: str, branches: model.SolutionRows
+) -> list[tuple[str, Markup, Markup, Sequence[float], str]]:
+    """The branches as they are listed by the player: mark, where it shows each, its name, where each joint is between
+    its limits (0 to 1), and how far the joints move."""
     singular = np.asarray(branches.singular.any(axis=1))
+    ways = np.where(robot.upper - robot.lower < np.inf, robot.upper - robot.lower, 1.0)
+    shares = np.where(ways == 1.0, 0.5, (meant(robot, branches.q_deg) - robot.lower) / ways)
     return [
         (
             "fail" if branches.refusal[k] else "caution" if singular[k] else "pass" if branches.rank[k] == 1 else "",
             stretch(target, k, k + SHOWN_S),
             moment(target, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
-            cells[k][-1],
+            shares[k].clip(-OVER, 1 + OVER).tolist(),
+            _outcome(branches, k, with_unit(fixed(branches.greatest_move_deg[k], 0), "deg")),
         )
         for k in range(len(branches))
     ]
@@ -172,18 +178,16 @@ def _branch_rows(branches: model.SolutionRows) -> list[list[str]]:
                 fixed(branches.limit_margin_deg[k], 1),
                 fixed(branches.manipulability[k], 3),
                 fixed(branches.greatest_move_deg[k], 1),
-                _outcome(branches, k, place),
+                _outcome(branches, k, tr("chosen") if place == 1 else tr("choice {place}", place=place)),
             ]
         )
     return cells
 
 
-def _outcome(branches: model.SolutionRows, k: int, place: int) -> str:
+def _outcome(branches: model.SolutionRows, k: int, taken: str) -> str:
+    """Why a solution is refused, or else what is said of it as ``taken``, with what is to be known of it."""
     if branches.refusal[k] is not None:
         return refusal_in_short(branches.refusal[k])
-    taken = tr("chosen") if branches.rank[k] == 1 else tr("choice {place}", place=place)
-    move = with_unit(fixed(branches.greatest_move_deg[k], 0), "deg")
-    taken = tr("{taken}: joints move {move}", taken=taken, move=move)
     if (freed := float(branches.freed_turn_deg[k])) > SAME:
         taken = tr("{taken}; tool turned by {angle}", taken=taken, angle=with_unit(fixed(freed, 1), "deg"))
     return with_singularity(taken, branches, k)

@@ -34,7 +34,7 @@ MARKS: Mapping[Status, str] = {
     "gauge": "↔",
     "given": "·",
 }
-FIRST = 5  # entries to settle, named at the table's side
+FIRST = 8  # entries to settle, named at the table's side
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
     "a": "a (mm)",
@@ -79,7 +79,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     left.sort(key=lambda each: (not each.off.moves, _unbounded(each), -each.off.mm, -each.off.deg))
     proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
     present = {each.status for each in numbers}
-    first = [ListRow("fail", each.entry, _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
+    first = [ListRow("fail", entry_word(each.entry), _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(robot, by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
@@ -101,18 +101,25 @@ def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
     left = [each for each in evidence.entries if each.entry in evidence.unconfirmed] if evidence else []
     steps = (
         (N_("Jog each joint: turns as drawn?"), ("direction",), "cell-direction1"),
-        (N_("Read five poses: they settle {names}."), (*CONTINUOUS, "beta"), "poses"),
-        (N_("Enter limits and speeds from the controller."), LIMITS, "cell-lower1"),
+        (N_("Read five poses, for {names}"), (*CONTINUOUS, "beta"), "poses"),
+        (N_("Enter limits and speeds from the controller"), LIMITS, "cell-lower1"),
     )
     rows = []
     for text, kinds, place in steps:
         own = [each for each in left if column_of(each.entry) in kinds]
-        named = joined([each.entry for each in own[:3]], ", ") + (" …" if len(own) > 3 else "") or tr("the table")
+        named = joined([entry_word(each.entry) for each in own[:3]], ", ") + (" …" if len(own) > 3 else "") or tr(
+            "the table"
+        )
         worst = max(own, key=lambda each: (each.off.mm, each.off.deg), default=None)
         if own or evidence is None:
             off = _tool_off(worst) if worst and worst.off.moves else ""
             rows.append(ListRow("caution", tr(text, names=named), off, f"#{place}"))
     return rows
+
+
+def entry_word(entry: str) -> str:
+    """An entry's name as the table's columns have it, such as ``α6``."""
+    return entry.replace("alpha", "α").replace("beta", "β")
 
 
 def known_alone(evidence: TableEvidence) -> int:

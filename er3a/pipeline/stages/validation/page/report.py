@@ -28,6 +28,7 @@ from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
 from er3a.pipeline.stages.validation.page.evidence_section import (
     SETTLED,
+    entry_word,
     evidence_section,
     known_alone,
     other_robot,
@@ -62,6 +63,7 @@ HEAD = 0.5  # of its radius, the length of its head
 TILT = 0.35  # of a circle around an axis in the drawing's plane, seen a little from above
 RADIUS = 0.045  # of such an arrow, of the size of the arm
 BELOW = 0.1  # of a reach: from one line to the next below the base
+LABELLED = 5  # of the lengths that are wrong, at most, so that words have room
 SEEN = "seen"  # address in the picture of what is to be done next
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
@@ -215,15 +217,16 @@ def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
     """The lengths that evidence contradicts most, and the angles that it leaves open, each at the link or joint that it
     is of; what is settled is in the table."""
     places, found = entry_places(robot), []
-    worst = [row.name for row in evidence.get("first", ())]
+    worst = [row.address for row in evidence.get("first", ())[:LABELLED]]
     for joint, cells in evidence.get("rows", ()):
         for cell in filter(None, cells):
             entry = cell["entry"]
             angle = column_of(entry) in ANGLES
-            if cell["status"] == "open" if angle else column_of(entry) in ("a", "d") and entry in worst:
+            if cell["status"] == "open" if angle else column_of(entry) in ("a", "d") and f"#cell-{entry}" in worst:
                 kind, gives = _kind(cell["status"]), cell["gives"]
-                text = joined([f"{entry} = {cell['value']}", gives], " → " if kind == "wrong" else " / ")
-                text = with_unit(text, "deg" if angle else "mm")
+                values = joined([cell["value"], gives], " → " if kind == "wrong" else tr(" or "))
+                text = f"{entry_word(entry)}: {with_unit(values, 'deg' if angle else 'mm')}"
+                text += "?" if kind == "open" else ""
                 found.append(Label(text, places.get(entry, places[str(joint)]), kind))
     return found
 

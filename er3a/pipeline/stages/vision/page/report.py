@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -22,8 +24,8 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
-from er3a.pipeline.viewing.figures import bars, new_figure
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
+from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
     panel_link,
@@ -105,26 +107,29 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
 
 
-def error_picture(each: model.ObjectResult, task: VisionFile) -> Picture:
-    """By how much the tool misses an object, by cause, and what the gripper tolerates."""
-    sizes = [(getattr(each.error_mm, part), getattr(each.error_deg, part)) for part in PARTS]
-    names = [word("vision.part_of_error", PARTS, part) for part in PARTS]
-    texts = [f"{fixed(mm, 2)} mm, {fixed(deg, 2)}°" for mm, deg in sizes]
-    figure, ax = bars(names, np.array(sizes)[:, 0], texts, [MODEL] * len(PARTS))
-    ax.axvline(min(task.gripper.tolerance_mm), color=HIGHLIGHT, label=tr("gripper's tolerance"))
-    ax.legend(loc="lower right", bbox_to_anchor=(1, 1))
-    ax.set_xlabel(tr("error (mm)"))
-    caption = tr("95 % bounds, by cause.")
-    return Picture(figure, caption, caption)
+def _errors(name: str, mm: model.ErrorParts, deg: model.ErrorParts, limit: float, moment: tuple[str, float]) -> Group:
+    """What the gripper tolerates, by how much the tool misses an object, and by what cause: bars to one scale."""
+    longest = max(limit, mm.together)
+    whole: list[Part] = [Part(0.0, 1.0, "none")]
+    rows = [
+        ListRow("none", tr("gripper's tolerance"), with_unit(f"{limit:g}", "mm"), "", moment, limit / longest, whole)
+    ]
+    for part, cause in PARTS.items():
+        off = getattr(mm, part)
+        text = f"{fixed(off, 2)} mm, {fixed(getattr(deg, part), 2)}°"
+        rows.append(ListRow("none", tr(cause), text, "", moment, off / longest, whole))
+    good: Literal["pass", "fail"] = "pass" if mm.together <= limit else "fail"
+    rows[1] = replace(rows[1], mark=good, parts=[Part(0.0, 1.0, good)])
+    return Group(tr("Error at {name}, 95 %", name=name), rows, counted=False)
 
 
 AXES = ("x", "y", "z")
 PARTS = {
-    "camera": N_("camera's noise in one reading"),
-    "calibration": N_("calibration"),
-    "repeatability": N_("arm's repeatability"),
+    "together": N_("error, all together"),
+    "camera": N_("camera's noise"),
     "table": N_("arm's table"),
-    "together": N_("together"),
+    "calibration": N_("calibration"),
+    "repeatability": N_("repeatability"),
 }
 
 
@@ -147,7 +152,6 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
         slides=bool(robot.slides.any()),
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
-        errors=[(each, error_picture(each, task)) for each in summary.objects if each.error_mm],
         player=player(
             robot,
             motions(robot, results, task),
@@ -165,19 +169,21 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
     grasped = [each for each in summary.objects if each.grasp]
     caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
     due, found = len(summary.objects) - len(caught), summary.calibration
-    headline = tr("{count} of {due} succeed.", count=len(grasped), due=due)
+    headline, below = tr("{count} of {due} can be grasped.", count=len(grasped), due=due), ""
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
     rest = all_caught(len(caught))
     if summary.verdict.status == "caution":  # what was not checked comes before both
-        headline, rest = joined([headline, rest], " "), ""
-    keys = []
-    if off := [each.error_mm.together for each in grasped if each.error_mm]:
+        below, rest = rest, ""
+    keys, limit = [], min(task.gripper.tolerance_mm)
+    measured = [(each.error_mm, each.error_deg, each) for each in grasped if each.error_mm and each.error_deg]
+    worst = max(measured, key=lambda found: found[0].together, default=None)
+    if worst:
         made = (
             tr("error at the grasp, 95 %, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
         )
-        allowed = with_unit(f"{min(task.gripper.tolerance_mm):g}", "mm")
-        keys = [(tr("{value} of {limit}", value=fixed(max(off), 1), limit=allowed), made)]
+        value, allowed = fixed(worst[0].together, 1), with_unit(f"{limit:g}", "mm")
+        keys = [(tr("{value} of {limit}", value=value, limit=allowed), made)]
     elif found:
         half = max(found.hand_eye.half_width_mm)
         keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
@@ -186,13 +192,16 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
         Group(tr("Can't be grasped"), [row for row in shown if row.mark == "fail"]),
         Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
+    if worst:
+        mm, deg, each = worst
+        groups.append(_errors(each.name, mm, deg, limit, grasp_moment(results, each)))
     if found and (found.suspects or found.warnings):
-        rows = [ListRow("caution", each.sample, _why_left_out(each), "#samples") for each in found.suspects]
-        rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
+        rows = [ListRow("caution", each.sample, _why_left_out(each), "#camera") for each in found.suspects]
+        rows += [ListRow("caution", tr("camera"), say(each), "#camera") for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
     gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
     text = tr("give the tool a shape (“carried”).")
-    return Answer(headline, rest, "", keys, groups, Fix(text, "#verdict", False) if "gripper" in gaps else None)
+    return Answer(headline, rest, below, keys, groups, Fix(text, "#verdict", False) if "gripper" in gaps else None)
 
 
 def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
@@ -201,7 +210,7 @@ def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
         return ListRow("fail", each.name, refusal_text(each), "#objects", moment)
     sure = each.grasp.probability
     note = tr("{percent} % succeed", percent=fixed(100 * sure, 1))
-    return ListRow("pass", each.name, note, f"#{each.name}", moment)
+    return ListRow("pass", each.name, note, "#objects", moment)
 
 
 def _why_left_out(found: Finding) -> str:
@@ -221,10 +230,9 @@ def _listed(values: Iterable[float], digits: int = 1) -> str:
     return ", ".join(fixed(value, digits) for value in values)
 
 
-def _poses(found: model.CalibrationResult) -> list[tuple[str, str, list[list[str]]]]:
-    """Title, quaternion and rows of both poses with intervals."""
-    both = zip(pose_words(found.setup), (found.hand_eye, found.board))
-    return [(title, _listed(pose.quaternion_wxyz, 6), _pose_rows(pose)) for title, pose in both]
+def _poses(found: model.CalibrationResult) -> list[tuple[str, list[list[str]]]]:
+    """Title and rows of both poses with intervals."""
+    return [*zip(pose_words(found.setup), map(_pose_rows, (found.hand_eye, found.board)))]
 
 
 def _pose_rows(pose: model.PoseEstimate) -> list[list[str]]:

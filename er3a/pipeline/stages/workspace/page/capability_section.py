@@ -15,21 +15,18 @@ from er3a.finding import Finding
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import tr
-from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.messages.say import bracketed, joined, say
-from er3a.pipeline.messages.workspace import millimetres, reached_text, run_again_text, stand_text
+from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.messages.workspace import reached_text, run_again_text, stand_text
 from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.stages.workspace import model
-from er3a.pipeline.stages.workspace.page.tray import Placing, limit_text
+from er3a.pipeline.stages.workspace.page.tray import Placing
 from er3a.pipeline.stages.workspace.page.workspace_figures import slide_names
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import INK
 from er3a.robots.robot import Robot
-
-ROUNDING = 1e-6  # mm
 
 
 def tray_rows(
@@ -67,49 +64,6 @@ def _sentence(links: Sequence[Markup], about: str = "") -> list[Markup]:
     """Links as a sentence; none where there are none."""
     lead = escape(about + tr(": ") if about else "")
     return [lead + Markup(", ").join(links) + "."] if links else []
-
-
-def _room(place: model.PlaceSummary) -> str:
-    """How far the tray can be moved along its axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds."""
-    parts = []
-    whole = (np.floor(1000 * np.array(room) + ROUNDING) for room in (place.room_down_m, place.room_up_m))
-    for axis, down, up in zip("xyz", *whole):
-        if down == up:
-            parts.append(f"{axis} {'±' if up else ''}{fixed(up, 0)}")
-        elif down or up:
-            parts.append(tr("{axis} {least} to {most}", axis=axis, least=fixed(-down, 0), most=fixed(up, 0)))
-    return ", ".join(parts)
-
-
-def place_row(name: str, place: model.PlaceSummary, capability: model.CapabilitySummary) -> list[str]:
-    """A row of the page's table of places for the tray.
-
-    Parameters
-    ----------
-    name : of the place
-    capability : says whether branches have names
-
-    Returns
-    -------
-    cells : name, middle and size in mm, branch, manipulability in % of the largest, and margin to limits. Then
-        clearance in mm with its pair of bodies, and the room around.
-    """
-    if place.branch is None and capability.arm_angles > 1:
-        branch = tr("at several values of what poses leave open")
-    elif place.branch is None:
-        branch = tr("changes within the tray") if capability.named_branches else tr("not known: branches have no names")
-    else:
-        branch = branch_word(place.branch)
-    return [
-        name,
-        millimetres(place.centre_m),
-        " × ".join(fixed(1000 * value, 0) for value in place.size_m),
-        branch,
-        fixed(100 * place.manipulability_ratio, 1),
-        limit_text(place),
-        bracketed(fixed(place.clearance_mm, 0), say(place.clearance_pair) if place.clearance_pair is not None else ""),
-        _room(place) or "0",
-    ]
 
 
 SHADES = "viridis_r"
@@ -197,20 +151,18 @@ def capability_context(
         "tray_rows": tray_rows(placing, results, placement, payload)
         if placing and isinstance(placement, model.PlacementSummary)
         else [],
-    } | _placement_context(capability, placement)
+    } | _placement_context(placement)
 
 
-def _placement_context(capability: model.CapabilitySummary, placement: model.Placement) -> dict[str, Any]:
+def _placement_context(placement: model.Placement) -> dict[str, Any]:
     if not isinstance(placement, model.PlacementSummary):
         return {"nowhere": say(placement)}
-    rows = [place_row(name, place, capability) for name, place in placement.named_places]
     return {
         "nowhere": "",
         "placing_scene": placement.scene,
         "placing_margin": fixed(placement.margin_mm, 0),
         "stands": [stand_text(stand, placement) for stand in placement.stands],
         "points_serving": placement.points_serving,
-        "place_rows": rows,
     }
 
 

@@ -1,8 +1,6 @@
-"""What axis 1 sweeps, what is around the arm, and trays, seen from above."""
+"""What axis 1 sweeps, what is around the arm, and the tray, seen from above."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from markupsafe import Markup
@@ -22,14 +20,11 @@ LETTER = 0.3  # half the width of a letter, of its height
 BASE = 0.06  # of the reach: radius of the dot at axis 1
 
 
-def from_above(
-    robot: Robot, results: WorkspaceResults, scene: Scene | None, trays: Sequence[Tray], letters: float
-) -> Markup:
+def from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, tray: Tray, letters: float) -> Markup:
     """The drawing as SVG, y to the left of x.
 
     Parameters
     ----------
-    trays : the first is the one that is proposed, others are outlines
     letters : height of words, in parts of the reach
 
     Returns
@@ -47,17 +42,13 @@ def from_above(
             around = np.concatenate(seen)
             at = np.array([around[:, 0].mean(), around[:, 1].max() + BASE * reach])
             words.append(_word(at, height, own_title(solid.name), "", size))
-    for number, tray in enumerate(trays, 1):
-        (left, below), (right, above) = (1000 * corner[:2] for corner in tray.corners)
-        kind = "tray other" if number > 1 else "tray"
-        corners = np.array([[left, below], [right, below], [right, above], [left, above]])
-        parts.append(Markup('<polygon class="{}" id="tray-{}" points="{}"/>').format(kind, number, _line(corners)))
-        name = tray.name if len(trays) > 1 else tr("tray")
-        at = np.array([(left + right) / 2, above + BASE * reach if number > 1 else below - height])
-        words.append(_word(at, height, name, kind, size))
+    (left, below), (right, above) = (1000 * corner[:2] for corner in tray.corners)
+    corners = np.array([[left, below], [right, below], [right, above], [left, above]])
+    parts.append(Markup('<polygon class="tray" points="{}"/>').format(_line(corners)))
+    words.append(_word(np.array([(left + right) / 2, below - height]), height, tr("tray"), "tray", size))
     gap = 2 * np.pi - (high - low)
     if gap > DEAD:
-        parts.append(Markup('<path class="dead" id="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
+        parts.append(Markup('<path class="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
         words.append(_word(0.85 * reach * _way(high + gap / 2), height, tr("dead zone"), "", size))
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"

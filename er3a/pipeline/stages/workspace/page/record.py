@@ -54,13 +54,13 @@ def _tray(placing: Placing | None) -> dict[str, Logged]:
     """The tray where it is best, and the stand that it needs."""
     if placing is None:
         return {}
-    tray = placing.tray
-    corners = [(tray.low, tray.high)]
-    if tray.floor is not None:
-        corners.append((np.array([*tray.low[:2], tray.floor]), np.array([*tray.high[:2], tray.low[2]])))
-    middles, sizes = ([f(low, high) for low, high in corners] for f in (lambda a, b: (a + b) / 2, lambda a, b: b - a))
-    colours = [(*rgb(VERDICTS["pass"]), 160), (*rgb(MUTED), 90)][: len(corners)]
-    box = rr.Boxes3D(centers=middles, sizes=sizes, colors=colours, labels=["tray", "stand"][: len(corners)])
+    parts = placing.tray.parts
+    box = rr.Boxes3D(
+        centers=[part.T[:3, 3] for part in parts],
+        sizes=[part.size for part in parts],
+        colors=[(*rgb(VERDICTS["pass"]), 160), (*rgb(MUTED), 90)][: len(parts)],
+        labels=[part.name for part in parts],
+    )
     return {"tray": box}
 
 

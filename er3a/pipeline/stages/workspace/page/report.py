@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from markupsafe import Markup
 
 from er3a.collision.scene import Scene
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
-from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
@@ -20,15 +19,12 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
-from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow
-from er3a.pipeline.viewing.page import Picture, render_stage, whole_sentence
+from er3a.pipeline.viewing.page import render_stage, whole_sentence
 from er3a.pipeline.viewing.side_view import Kind
 from er3a.robots.robot import Robot
-
-LETTERS = 0.09  # of the reach, in the view from above: as large as others on a phone
 
 
 def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
@@ -41,7 +37,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     known = read_stage(folder, STAGES["dynamics"]).results.summary if folder and is_computed(folder) else None
     there = tr("What the arm can carry at the tray was not examined.")
     payload = joined([payload_text(known, robot), there], " ") if placing else ""
-    context = _context(robot, results, placing, payload)
+    trays = [each.tray for each in placing.tried] if placing else []
+    context = capability_context(robot, results, placing, payload)
     if contradicted:
         context["nowhere"] = sentence("box.contradicted")
     render_stage(
@@ -49,9 +46,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         stored,
         output,
         _answer(summary, placing, [] if known else [payload_key(known, robot)]),
-        plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
         labelled=_labelled(robot, results, scene, "wrong" if contradicted else "right"),
-        turning=workspace_figures.in_space(robot, results, scene, placing.tray if placing else None),
+        turning=workspace_figures.in_space(robot, results, scene, trays),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
         **context,
@@ -73,7 +69,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
     rest, fix, best = "", None, placing.tried[0] if placing else None
     if placing and best and not sum(map(len, placing.hindered(best).values())):
         rest, centre = whole_sentence(tr("{tray} fits", tray=best.tray.name)), millimetres(best.tray.place.centre_m)
-        fix = Fix(tr("add it to the scene at {centre} mm, with its stand.", centre=centre), "#placement", False)
+        fix = Fix(tr("add the tray and its stand to the scene at {centre} mm.", centre=centre), "#tray-1", False)
     keys = [
         (
             tr("{low} to {high} mm", low=millimetres([reach.lowest]), high=millimetres([reach.highest])),
@@ -89,23 +85,17 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
     voids = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     groups = (
         Group(tr("Where the tray goes"), _tray_as_rows(placing)),
-        Group(tr("Voids"), [_void_as_row(*each, bool(placing)) for each in voids]),
+        Group(tr("Where the tool can't go"), [_void_as_row(*each) for each in voids]),
     )
     return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups, fix)
 
 
-def _void_as_row(number_: int, void: model.VoidSummary, planned: bool) -> ListRow:
-    """A void: what kind, how large; ``planned``: whether there is a view from above."""
-    size = workspace_figures.litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
-    note = with_unit(size, "L")
-    of_one = {joint for limit in void.cause.params.get("limits", ()) for joint in limit.joints} == {1}
-    name = tr(workspace_figures.VOID_NAMES[void.kind], number=number_)
+def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
+    """A void: which one, how large."""
+    note = with_unit(workspace_figures.litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper), "L")
     if void.holds_shoulder:
-        name, note = tr("at the shoulder"), tr("{size}: normal", size=note)
-    elif of_one:
-        name = tr("in the dead zone")
-    address = f"#hole-{number_}" if void.kind == "enclosed" else "#dead" if of_one and planned else f"#void-{number_}"
-    return ListRow("none", name, note, address)
+        note = tr("{size}: normal", size=note)
+    return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
 
 
 def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
@@ -121,34 +111,12 @@ def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
     return rows
 
 
-def _context(robot: Robot, results: model.WorkspaceResults, placing: Placing | None, payload: str) -> dict[str, Any]:
-    summary = results.summary
-    return capability_context(robot, results, placing, payload) | {
-        "section": Picture(
-            workspace_figures.sections(robot, results),
-            tr("Section across the slide of joint 1: proven cells")
-            if summary.proof.bars
-            else tr("Side section about axis 1: proven cells"),
-            _section_caption(summary),
-        ),
-    }
-
-
 def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
     return [
         str(row),
-        tr(workspace_figures.VOID_NAMES[void.kind], number=row),
+        workspace_figures.void_name(row, void),
         workspace_figures.litres(low, high),
         *map(millimetres, (void.centroid_m, void.low_m, void.high_m)),
         say(void.cause),
     ]
-
-
-def _section_caption(summary: model.WorkspaceSummary) -> str:
-    return tr(
-        "What is empty is proven unreachable all around (along a slide: all along). Of {checked} recorded samples, "
-        "{inside} lie in a cell proven unreachable.",
-        checked=number(summary.proof.points_checked),
-        inside=summary.proof.points_in_empty_cells,
-    )

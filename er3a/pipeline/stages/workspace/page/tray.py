@@ -40,6 +40,11 @@ MOTIONS = {name: stage.motions for name, stage in STAGES.items() if stage.motion
 NAMED = 3  # motions that a short line names
 
 
+def _box(name: str, low: Reals, high: Reals) -> Box:
+    """A level box between two corners (3,), m."""
+    return Box(name, transform((low + high) / 2, np.zeros(3)), high - low)
+
+
 @dataclass(frozen=True, eq=False)
 class Tray:
     """A tray at a place, with the stand that it needs.
@@ -109,11 +114,17 @@ class Tray:
         low[2] = low[2] if self.floor is None else min(low[2], self.floor)
         return low, self.high
 
+    @property
+    def parts(self) -> list[Box]:
+        """It, and the stand that it needs."""
+        found = [_box("tray", self.low, self.high)]
+        if self.floor is not None:
+            found.append(_box("stand", np.array([*self.low[:2], self.floor]), np.array([*self.high[:2], self.low[2]])))
+        return found
+
     def scene(self, carried: Scene | None) -> Scene:
         """It and its stand as solids, for an arm that carries what that of ``carried`` does."""
-        low, high = self.corners
-        whole = Box("tray", transform((low + high) / 2, np.zeros(3)), high - low)
-        return Scene("tray", (whole,), carried.carried if carried else ())
+        return Scene("tray", (_box("tray", *self.corners),), carried.carried if carried else ())
 
 
 @dataclass(frozen=True, eq=False)

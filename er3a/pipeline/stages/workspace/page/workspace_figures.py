@@ -2,85 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from markupsafe import Markup
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from er3a.collision.scene import Scene
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.language import N_, own_title, tr
-from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
+from er3a.pipeline.language import N_, tr
+from er3a.pipeline.messages.numbers import at_least, at_most, fixed
 from er3a.pipeline.messages.workspace import reaches
-from er3a.pipeline.player.turning import ColourScale, Layer, Solids, surroundings, turning_figure
+from er3a.pipeline.player.turning import Layer, Solids, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import drawn_scene
-from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MUTED, VERDICTS, VOIDS
+from er3a.pipeline.viewing.palette import VERDICTS, VOIDS
 from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, dimension, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
 from er3a.workspace.voids import mesh as surface_of
 
-PROOF = {
-    N_("reachable"): "#9ecae1",
-    N_("reachable except a wedge"): "#d6e6f2",
-    N_("undecided"): HIGHLIGHT,
-    N_("unreachable"): "none",
-}
-FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
+REACHED = "#9ecae1"
 ASIDE = (0.12, 0.2)  # of the reach, from a void before axis 1 to its name
 BELOW = 0.08  # of the reach, from what is reached down to its dimension
-PANEL_IN, AROUND_PANEL_IN = 5.6, 1.6  # the panel's width; what stands above and below, in
-
-
-def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
-    """What is proven, in a side section about axis 1, or across it where it slides."""
-    border, bars = results.border, results.summary.proof.bars
-    figure, axes = new_figure(width=7.5, height=9.0)
-    at_zero = skeleton(robot, np.zeros(robot.joints))
-    if bars:
-        arm, across, up = _across(bars, at_zero), *slide_names(bars.frame)
-    else:
-        arm = _about(results.summary.axis, at_zero)
-        across, up = tr("distance from axis 1 (mm)"), tr("height along axis 1 (mm)")
-    _draw_proof(axes, results.proof, bars)
-    _draw_border(axes, border)
-    axes.plot(*arm.T * 1000, color=INK, linewidth=2.4, marker="o", markersize=4, solid_capstyle="round")
-    equal_scale(axes, across, up, fill=False)
-    if not bars:
-        axes.set_xlim(0, None)
-    handles: list[Artist] = [
-        Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label=tr("arm, all joints 0"))
-    ]
-    if len(border):
-        handles.append(Line2D([], [], color=INK, label=tr("outline of what may be reached")))
-    states = [state for kind, state in enumerate(PROOF) if not (bars and kind == WEDGE)]
-    handles += [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
-    ratio = axes.dataLim.height / max(axes.dataLim.width, 1e-9)
-    figure.set_figheight(float(np.clip(PANEL_IN * ratio + AROUND_PANEL_IN, 4.5, 9.0)))
-    return figure
-
-
-def _across(bars: model.Bars, points: Reals) -> Reals:
-    """Points (n, 3), m, of the base frame in the plane across the slide (n, 2), counted from the base's origin."""
-    return points @ np.array(bars.frame.axes)[[0, 2]].T
-
-
-def _origin_across(bars: model.Bars | None) -> Reals:
-    """Where the section of the proof begins in the plane that is drawn, (2,), m."""
-    return _across(bars, np.array([bars.frame.origin_m]))[0] if bars else np.zeros(2)
 
 
 def slide_names(frame: model.SectionFrame) -> tuple[str, str]:
@@ -92,47 +40,14 @@ def slide_names(frame: model.SectionFrame) -> tuple[str, str]:
     )
 
 
-def _draw_proof(axes: Axes, proof: model.ProofCells, bars: model.Bars | None) -> None:
-    """Cells of the proof, in a shade for each of its states."""
-    corners = (np.concatenate([proof.rho_m, proof.z_m], axis=1) + _origin_across(bars)[[0, 0, 1, 1]]) * 1000
-    filled, empty = proof.filled_ratio, proof.empty_ratio
-    if bars:  # their ends are empty
-        filled, empty = filled / np.maximum(1 - empty, 1e-12), (empty >= 1).astype(float)
-        filled = np.where((filled > 0.5) | (empty == 1), 1 - empty, 0.0)
-    kinds = np.select([1 - filled - empty > 0.5, empty >= 0.5, filled < 1], [UNDECIDED, EMPTY, WEDGE], FILLED)
-    for kind, colour in enumerate(PROOF.values()):
-        a, b, c, d = corners[kinds == kind].T
-        boxes = np.stack([np.stack([a, c], 1), np.stack([b, c], 1), np.stack([b, d], 1), np.stack([a, d], 1)], axis=1)
-        axes.add_collection(
-            PolyCollection(list(boxes), facecolors=colour, edgecolors=colour, linewidths=0.2, rasterized=True)
-        )
-    axes.set_ylim(corners[:, 2].min(), corners[:, 3].max())
-
-
-def _draw_border(axes: Axes, border: model.Border) -> None:
-    for each in np.unique(border.arc):
-        line = border.take(border.arc == each)
-        axes.plot(line.rho_m * 1000, line.z_m * 1000, color=INK, linewidth=1.3)
-
-
-def _about(axis: model.AxisSummary, points: Reals) -> Reals:
-    """Distance from axis 1 and height along it (n, 2) of points (n, 3), m."""
-    offset = points - axis.point_m
-    height = offset @ axis.direction
-    away = np.sqrt(np.maximum(0, (offset**2).sum(axis=1) - height**2))
-    return np.stack([away, height], axis=1)
-
-
-def _slice(proof: model.ProofCells, rho: Reals, azimuth: Reals, z: float) -> Integers:
-    """State of each pixel (m, deg) about axis 1, as a row of PROOF."""
-    state = np.full(rho.shape, EMPTY)
+def _filled(proof: model.ProofCells, rho: Reals, azimuth: Reals, z: float) -> Flags:
+    """Which places (m, deg) about axis 1 are proven reachable at a height."""
+    found = np.zeros(rho.shape, dtype=bool)
     for row in np.flatnonzero((proof.z_m[:, 0] <= z) & (z < proof.z_m[:, 1])):
         ring = (rho >= proof.rho_m[row, 0]) & (rho < proof.rho_m[row, 1])
-        empty, unfilled = (
-            _on_arcs(azimuth[ring], arcs[row]) for arcs in (proof.empty_arcs_deg, proof.unfilled_arcs_deg)
-        )
-        state[ring] = np.where(empty, EMPTY, np.where(unfilled, UNDECIDED, FILLED))
-    return state
+        arcs = np.concatenate([proof.empty_arcs_deg[row], proof.unfilled_arcs_deg[row]])
+        found[ring] = ~_on_arcs(azimuth[ring], arcs)
+    return found
 
 
 def _on_arcs(azimuth: Reals, arcs: Reals) -> Flags:
@@ -144,36 +59,35 @@ def _on_arcs(azimuth: Reals, arcs: Reals) -> Flags:
 
 CLOUD_POINTS = 12_000
 VOID_NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
-
-
 BODY_BLOCKS = (36, 56, 60)  # of the reached body, along radius, height and around
 SMOOTHED = 8  # times that its corners go to the mean of their neighbours
 
 
-def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None, tray: Tray | None) -> Markup:
-    """What is proven reachable, the cloud and the voids, the scene and the arm at zero in a figure that turns."""
-    cloud, vertices, triangles = results.cloud, results.void_vertices, results.void_triangles
-    value = cloud.manipulability_m3[:CLOUD_POINTS]
-    most = float(np.quantile(value, 0.99)) or 1.0
-    points, shade = 1000 * cloud.point_m[:CLOUD_POINTS], value / most
-    body, faces = _reached_body(robot, results)
-    layers = [
-        Layer(tr("reachable"), 1000 * body, PROOF["reachable"], faces=faces, cut=True),
-        Layer(tr("cloud"), points, width=1.6, shade=shade, cut=True),
-    ]
+def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None, trays: Sequence[Tray]) -> Markup:
+    """What is proven reachable with its voids, the scene, the trays and the arm at zero, in a figure that turns; of an
+    arm that reaches no more than a plane the points that were sampled.
+
+    Parameters
+    ----------
+    trays : the first is the one that is proposed
+    """
+    vertices, triangles = results.void_vertices, results.void_triangles
+    if results.summary.is_flat:
+        layers = [Layer(tr("reachable"), 1000 * results.cloud.point_m[:CLOUD_POINTS], REACHED)]
+    else:
+        body, faces = _reached_body(robot, results)
+        layers = [Layer(tr("reachable"), 1000 * body, REACHED, faces=faces, cut=True)]
     for i, void in enumerate(results.summary.voids, start=1):
         faces = triangles.corners[triangles.void == i]
         if len(faces):
-            name = tr(VOID_NAMES[void.kind], number=i)
             corners = 1000 * _smoothed(vertices.point_m[vertices.void == i], faces)
-            layers.append(Layer(name, corners, VOIDS[void.kind], faces=faces))
-    scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
+            layers.append(Layer(void_name(i, void), corners, VOIDS[void.kind], faces=faces, address=f"hole-{i}"))
     solids = surroundings(robot, scene)
-    if tray:
-        colour = VERDICTS["pass"]
-        shapes = [shape | {"colour": colour} for shape in drawn_scene(tray.scene(None).solids, robot)]
-        solids.append(Solids(tr("tray"), shapes, np.eye(4)[None], colour))
-    return turning_figure(layers, scale, solids, cut_m=results.summary.axis.point_m[1])
+    for i, tray in enumerate(trays, start=1):
+        colour = VERDICTS["pass" if i == 1 else "caution"]
+        drawn, *stand = drawn_scene(tray.parts, robot)
+        solids.append(Solids(tray.name, [drawn | {"colour": colour}, *stand], np.eye(4)[None], colour, f"tray-{i}"))
+    return turning_figure(layers, solids, cut_m=results.summary.axis.point_m[1])
 
 
 def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals, Integers]:
@@ -185,8 +99,9 @@ def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals,
     azimuth = np.linspace(0.0, TURN, around + 1)
     middle_rho, middle_z, middle_azimuth = ((edge[1:] + edge[:-1]) / 2 for edge in (rho, z, azimuth))
     at_rho, at_azimuth = np.meshgrid(middle_rho, np.degrees(middle_azimuth), indexing="ij")
-    filled = np.stack([_slice(proof, at_rho, at_azimuth, height) == FILLED for height in middle_z], axis=1)
-    points, faces = surface_of(Blocks(rho, z, azimuth, 1.0 - filled, 1.0 - filled, frame.bar), filled)
+    filled = np.stack([_filled(proof, at_rho, at_azimuth, height) for height in middle_z], axis=1)
+    empty = 1.0 - filled.astype(float)
+    points, faces = surface_of(Blocks(rho, z, azimuth, empty, empty, frame.bar), filled)
     return _smoothed(points, faces) @ frame.R + frame.origin, faces
 
 
@@ -223,7 +138,7 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
         label = void_label(number_, void)
         if void.kind == "enclosed":
             labels.append(replace(label, at=label.at + high * ASIDE, start=label.at))
-    seen = SeenArm(own_title(robot.title), "", kind, arm, lines)
+    seen = SeenArm(tr("From the side"), "", kind, arm, lines)
     far, height = outer[outer[:, 0].argmax()]
     below = low[1] - BELOW * far
     labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far / 2]), kind))
@@ -234,6 +149,15 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
 def litres(low: float, high: float) -> str:
     """Bounds of a volume in litres, rounded outwards."""
     return tr("{low} to {high}", low=at_least(low, "L"), high=at_most(high, "L"))
+
+
+def void_name(number_: int, void: model.VoidSummary) -> str:
+    """What a void is called: by its place, or else by its number and kind."""
+    if void.holds_shoulder:
+        return tr("void at the shoulder")
+    if {joint for limit in void.cause.params.get("limits", ()) for joint in limit.joints} == {1}:
+        return tr("void in dead zone")
+    return tr(VOID_NAMES[void.kind], number=number_)
 
 
 def void_label(number_: int, void: model.VoidSummary) -> Label:
