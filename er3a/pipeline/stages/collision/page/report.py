@@ -57,11 +57,9 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     robot = study.robot(name)
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
-    inside = results.paths.take(results.paths.clearance_mm < 0)
-    firsts = dict(zip(inside.path[::-1].tolist(), inside.t_s[::-1].tolist()))
     # A path of which a part can't be reached is clear of nothing.
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
-    answer = _answer(summary, closest, unreached, firsts, _advice(stored.folder))
+    answer = _answer(summary, closest, unreached, _advice(stored.folder))
     render_stage(
         study,
         stored,
@@ -87,19 +85,17 @@ def _answer(
     summary: model.CollisionSummary,
     closest: Sequence[model.Closest],
     unreached: set[str],
-    firsts: Mapping[str, float],
     advice: Mapping[str, Fix],
 ) -> Answer:
     """How many paths and chosen solutions are clear of everything, and how near each comes.
 
     What collides as its file expects is named, and so is a path of which only a part was measured: that is clear of
-    nothing. ``unreached``: these; ``firsts``: when (s) paths first touch something, and ``advice``: what may be run
-    instead of a path, by their names.
+    nothing. ``unreached``: these; ``advice``: what may be run instead of a path, by its name.
     """
     params = summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
-    most = max((each.clearance_mm for each in closest), default=1.0)
-    rows = [_row(each, unreached, near, firsts, advice, most) for each in closest]
+    most = max((abs(each.clearance_mm) for each in closest), default=1.0) or 1.0
+    rows = [_row(each, unreached, near, advice, most) for each in closest]
     hit, clear, partly = (
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
@@ -145,24 +141,22 @@ def _row(
     found: model.Closest,
     unreached: set[str],
     near: Sequence[str],
-    firsts: Mapping[str, float],
     advice: Mapping[str, Fix],
     most_mm: float,
 ) -> ListRow:
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
     which only a part was measured.
 
-    The bar is the clearance in parts of ``most_mm``."""
+    The bar is the clearance, or the depth of an overlap, in parts of ``most_mm``."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     of_path = found.kind == "path"
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     if of_path and found.name in unreached and mark != "fail":
         mark = "none"
-    bar = [Part(0.0, 1.0, mark)] if mark == "none" else []
+    bar = [Part(0.0, 1.0, mark)] if mark in ("none", "fail") else []
     fix = advice.get(found.name) if mark == "fail" and of_path else None
-    length = max(0.0, found.clearance_mm) / most_mm
-    seen = firsts.get(found.name, found.t_s) if of_path else None
-    return ListRow(mark, found.name, note, "", (found.name, seen or 0.0), length, bar, fix)
+    length = abs(found.clearance_mm) / most_mm
+    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, bar, fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

@@ -26,6 +26,7 @@ from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
+TALL = 4.3  # inches, of figures at the side of the player
 KEY: dict[str, Any] = {
     "fontsize": 10,
     "handlelength": 1.2,
@@ -37,7 +38,7 @@ KEY: dict[str, Any] = {
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     """Torques of all joints with their intervals, and what most of the greatest comes from."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, torque = new_figure(width=5.2, height=3.6)
+    figure, torque = new_figure(width=5.2, height=TALL)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     for j in range(rows.torque.shape[1]):
         colour = JOINTS[j % len(JOINTS)]
@@ -70,6 +71,7 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
     texts = [f"{with_unit(number(m, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}" for m, way in zip(kg, far)]
     names = [tr("link {number}", number=each.link) for each in links]
     figure, ax = bars(names, torques, texts, [JOINTS[each.link - 1] for each in links])
+    figure.set_figheight(TALL)
     ax.set_xlabel(axis_label(model.TorqueRows, "torque", held.unit))
     caption = tr("What each link adds to J{joint}: its mass times its level distance.", joint=held.joint)
     return Picture(figure, caption, caption)
@@ -149,10 +151,9 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     worst = _worst(summary.motors)
     limited = _limited(summary)
     over = [f"J{motor.joint}" for motor in summary.motors if _mark(motor) == "fail"]
+    headline = tr("Within all limits.") if limited else tr("J{joint} bears most.", joint=worst.joint)
     if over:
         headline = tr("Too much for {joints}.", joints=joined(over, ", "))
-    else:
-        headline = tr("Within all limits.") if limited else tr("Cannot judge: motor limits missing.")
     moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
@@ -181,7 +182,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
     return Answer(
         headline,
-        "",
+        "" if limited or over else tr("Motor limits are missing."),
         tr("At least: without {parts}.", parts=joined(left, ", ")) if left else "",
         [
             (moving, tr("J{joint} moving", joint=worst.joint)),

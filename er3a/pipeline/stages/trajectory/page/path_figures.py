@@ -5,7 +5,7 @@ Layout is fixed: finding places takes longer than drawing.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,7 +17,6 @@ from matplotlib.ticker import MaxNLocator
 from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
-from er3a.pipeline.messages.kinematics import singularity_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory import model
@@ -30,29 +29,27 @@ from er3a.robots.robot import Robot
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show
 NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
-TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
 ROWS = 4  # of axes, below one another
 LEFT, BOTTOM, TOP, WIDTH = 0.09, 0.06, 0.95, 0.89
 FONT = 9.0
+OFF = 0.005  # mm or deg, from which on a repair counts as off the path
 
 
-def path_picture(
-    robot: Robot, path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds, alt: str, caption: str
-) -> Picture:
-    """Joint curves of a path, below them its distances from singular poses, all over one time.
+def path_picture(robot: Robot, path: model.PathSummary, rows: model.PathChecks, alt: str, caption: str) -> Picture:
+    """Joint curves of a path, below them its distance from singular poses, all over one time.
 
     Parameters
     ----------
     rows : of the path, as many as its curves need
-    near : from where on a pose counts as near a singular one
     """
     figure = Figure(figsize=(9.6, 8.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
-    *joints, distances = (_axes(figure, row) for row in range(ROWS))
+    *joints, last = (_axes(figure, row) for row in range(ROWS))
     for ax in joints:
         ax.tick_params(labelbottom=False)
-    distances.set_xlabel(axis_label(rows, "t_s"), fontsize=FONT)
+    last.set_xlabel(axis_label(rows, "t_s"), fontsize=FONT)
     _joint_curves(joints, robot, path, rows)
-    _distances(distances, rows, near)
+    last.plot(rows.t_s, rows.smallest_singular_value, color=palette.MODEL)
+    last.set_ylabel(tr("smallest singular value"), fontsize=FONT)
     for ax in figure.axes:
         _mark(ax, path)
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
@@ -75,7 +72,7 @@ def nearness_picture(
     shapes : the assumed ones, which may be wrong by their margin; None where none are assumed
     path : whose faults are marked; None of a motion that repairs them
     """
-    figure, ax = new_figure(width=5.2, height=2.6)
+    figure, ax = new_figure(width=5.2, height=3.0)
     ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
     if path:
         _mark(ax, path)
@@ -94,22 +91,45 @@ def nearness_picture(
     return Picture(figure, tr("Clearance"), caption, [(ax, name)])
 
 
-def fault_picture(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> Picture:
-    """What fails on a path that meets nothing, over its time: its distances from singular poses, or where it meets none
-    and is too fast, the speed of its fastest joint in parts of the limit; below or above the dashed line it fails."""
-    figure, ax = new_figure(width=5.2, height=2.6)
-    if path.too_fast and path.verdict != "singular" and not path.unreachable:
-        title = tr("Joint speed")
-        ax.plot(rows.t_s, rows.speed_ratio, color=palette.MODEL, linewidth=2.2)
-        ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
-        ax.set_ylabel(tr("speed / limit"))
+def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.PathChecks | None = None) -> Picture:
+    """What fails on a path that meets nothing, over the time of a motion: the speed of its fastest joint in parts of
+    the limit, or else how far it is from singular poses.
+
+    Parameters
+    ----------
+    name : of the motion: the path, or what repairs it
+    rows : of the path, or of the avoidance strategy that repairs it
+    before : of the path, if the motion repairs it
+    """
+    figure, ax = new_figure(width=5.2, height=3.0)
+    fast = path.too_fast and path.verdict != "singular" and not path.unreachable
+    column = "speed_ratio" if fast else "smallest_singular_value"
+    if before is not None:
+        ax.plot(before.t_s, getattr(before, column), color=palette.MUTED, linestyle="--", label=tr("as programmed"))
+        off = (rows.deviation_mm > OFF) | (rows.deviation_deg > OFF)
+        ax.fill_between(
+            rows.t_s,
+            *(0, 1),
+            where=off.tolist(),
+            transform=ax.get_xaxis_transform(),
+            color=palette.VERDICTS["pass"],
+            alpha=0.2,
+            linewidth=0,
+            label=tr("off the path") if off.any() else None,
+        )
+        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, handlelength=1.2, ncols=2)
     else:
-        title = tr("Distance from singular poses")
-        _distances(ax, rows, near)
-    _mark(ax, path)
+        _mark(ax, path)
+    ax.plot(rows.t_s, getattr(rows, column), color=palette.MODEL, linewidth=2.2)
+    if fast:
+        ax.axhline(1.0, color=palette.TOUCHING, linewidth=1.2)
+    ax.set_ylim(bottom=0.0)
     ax.set_xlim(0.0, rows.t_s[-1])
     ax.set_xlabel(axis_label(rows, "t_s"))
-    return Picture(figure, title, "", [(ax, path.name)])
+    ax.set_ylabel(tr("speed / limit") if fast else tr("smallest singular value"))
+    title = tr("Fastest joint") if fast else tr("Distance from singular poses")
+    crosses = before is not None and not fast and path.strategy == "detour"
+    return Picture(figure, title, tr("A joint move may cross the singular pose.") if crosses else "", [(ax, name)])
 
 
 def _axes(figure: Figure, row: int) -> Axes:
@@ -132,26 +152,6 @@ def _joint_curves(axes: list[Axes], robot: Robot, path: model.PathSummary, rows:
             _limits(ax, robot, values)
         elif not path.joint_speed_bounded:
             _cut(ax, values)
-
-
-def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> None:
-    """Distance from each singular set, in parts of the distance below which a pass counts as near."""
-    curves = (
-        ("wrist", rows.wrist_deg, near.wrist_deg),
-        ("elbow", rows.elbow_deg, near.elbow_deg),
-        ("shoulder", rows.shoulder_mm, near.shoulder_mm),
-    )
-    for kind, distance, threshold in curves:
-        ratio = np.maximum(np.abs(distance) / threshold, 1e-4)
-        ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=singularity_word(kind))
-    ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
-    ax.set_yscale("log")  # with ticks of its own: matplotlib's take longer than all curves
-    ax.set(ylim=(0.01, 100.0), yticks=[0.01, 0.1, 1, 10, 100], yticklabels=["0.01", "0.1", "1", "10", "100"])
-    ax.minorticks_off()
-    ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
-    legend = ax.legend(loc="lower left", ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
-    legend.set_frame_on(True)  # a ground of its own, where a curve passes behind it
-    legend.get_frame().set(facecolor="white", edgecolor="none", alpha=0.85)
 
 
 def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
