@@ -333,15 +333,22 @@ def reasons(tried: model.TriedStrategy) -> str:
 
 def repair_text(path: model.PathSummary, slowed: Slowed | None = None, switch: str = "") -> str:
     """All that is said of the strategy that was chosen; ``switch``: of its start, as :func:`switch_text` says it."""
-    _, motion = _chosen(path)
-    passes = path.singularities and not path.in_joint_space and not motion.keeps_clear
+    motion = _chosen(path).motion
+    passes = path.singularities and not path.in_joint_space and motion and not motion.keeps_clear
     near = sentence("advice.region") if passes else ""
     return sentence("finding", finding=joined([repair_lead(path, slowed), near, switch, whole_pace(path)], ". "))
 
 
 def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
     """What the strategy that was chosen does, and what it costs."""
-    tried, motion = _chosen(path)
+    return strategy_text(path, _chosen(path), slowed)
+
+
+def strategy_text(path: model.PathSummary, tried: model.TriedStrategy, slowed: Slowed | None = None) -> str:
+    """What a strategy that is possible does, and what it costs."""
+    motion = tried.motion
+    if motion is None:
+        raise ValueError(f"{path.name} has no motion by {tried.name}")
     clearance = math.floor(10 * motion.clearance.least_mm) / 10 if motion.clearance else None
     way = strategy_word(tried.name)
     if slowed:
@@ -358,11 +365,10 @@ def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
     )
 
 
-def _chosen(path: model.PathSummary) -> tuple[model.TriedStrategy, model.StrategyMotion]:
-    tried = path.chosen
-    if tried is None or tried.motion is None:
+def _chosen(path: model.PathSummary) -> model.TriedStrategy:
+    if path.chosen is None:
         raise ValueError(f"{path.name} has no motion that repairs it")
-    return tried, tried.motion
+    return path.chosen
 
 
 def _shortly(value: float) -> str | None:

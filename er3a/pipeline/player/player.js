@@ -114,11 +114,8 @@ function draw() {
   const touching = new Set([...colours.keys()].filter((name) => colours.get(name) === data.colours.touching));
   const poses = arms.map((arm, k) => posesOf(arm, valuesAt(motion.times, motion.values[k], t)));
   const { page } = space;
-  if (space.target !== motion.target) {
-    space.turn(motion.turned - (space.turned ?? 0), 0);
-    const { target, length, turned } = motion;
-    Object.assign(space, { target, length, turned, distance: (space.distance * length) / space.length });
-  }
+  if (space.target !== motion.target) Object.assign(space, { target: motion.target, distance: (space.distance * motion.length) / space.length, length: motion.length });
+  if (space.turned !== motion.turned) Object.assign(space, { azimuth: space.azimuth + motion.turned - (space.turned ?? 0), turned: motion.turned });
   space.begin();
   space.floor(column(table.base, 3), data.size / 10, floor);
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
@@ -185,7 +182,6 @@ function tellLoads(poses) {
   });
 }
 
-/** Names where a motion starts and where it ends. */
 function nameEnds(trail) {
   const [first, last] = [trail[0], trail.at(-1)];
   if (trail.every((point) => Math.hypot(...subtract(point, first)) < CLOSED * data.size)) return; // at rest

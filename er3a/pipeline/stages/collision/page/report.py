@@ -6,19 +6,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from markupsafe import Markup
 
 from er3a.collision.pairs import TRIED
-from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, tr, with_unit
+from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.motions import fix_of
+from er3a.pipeline.player.motions import at_rest, fix_of
 from er3a.pipeline.player.player import drawing_head, player
-from er3a.pipeline.player.turning import Layer, surroundings, turning_figure
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
@@ -27,25 +24,7 @@ from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, all_caught
 from er3a.pipeline.viewing.page import render_stage
-from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
-
-PLACE_PX = 5.0
-
-
-def _places(robot: Robot, results: model.CollisionResults, scene: Scene | None) -> Markup:
-    """The middles of the cells that are reached, by what is left of them, in a figure that turns."""
-    rows = results.places
-    groups = (
-        (tr("connected to home"), rows.joined, VERDICTS["pass"]),
-        (tr("clear, not connected"), rows.clear & ~rows.joined, MODEL),
-        (tr("lost"), ~rows.clear, VERDICTS["fail"]),
-    )
-    layers = [Layer(name, rows.middle_mm[own], colour, PLACE_PX, cut=True) for name, own, colour in groups if own.any()]
-    return (
-        turning_figure(layers, solids=surroundings(robot, scene), cut_m=float(robot.base[1, 3])) if layers else Markup()
-    )
-
 
 NO_BREAK_SPACE = "\u00a0"
 MAX_ROWS = 100  # of the list of targets and paths
@@ -68,10 +47,9 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         matrix=_matrix(robot, results.matrix),
         never_met=int((results.matrix.state == "never").sum()),
         tried=TRIED,
-        places=_places(robot, results, scene),
         player=player(
             robot,
-            [*motions(robot, results), *poses(robot, results)],
+            [*motions(robot, results), *poses(robot, results)] or [at_rest(robot, own_title(robot.title))],
             scene,
             opened=next((group.rows[0].play for group in answer.shown_groups), None),
         ),

@@ -15,12 +15,12 @@ from er3a.pipeline.language import own_title, tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.planning import FAR
-from er3a.pipeline.messages.say import bracketed, say
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import (
     kind_word,
     path_text,
     reasons,
+    strategy_text,
     strategy_word,
 )
 from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_of, opened, row_of
@@ -72,7 +72,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count))
         links = _programs(path, files, lines, met or {})
-        drawn = _figure(robot, path, rows) if i < count else None
+        drawn = _figure(path, rows) if i < count else None
         over_time = _over_time(path, results) if i < count else []
         sections.append({**_section(path, drawn, links, summary), "over_time": over_time})
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
@@ -216,15 +216,14 @@ def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
     return bool(program["file"].rpartition(".")[0] == repair_name(path.name))
 
 
-def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks) -> Picture:
+def _figure(path: model.PathSummary, rows: model.PathChecks) -> Picture:
     text = path_text(path)
     alt = tr(
-        "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets. "
-        "{finding}.",
+        "Joint angles and velocities over time for {path}. {finding}.",
         path=path.name,
         finding=text,
     )
-    return path_picture(robot, path, _drawn(path, rows), alt, whole_sentence(text))
+    return path_picture(path, _drawn(path, rows), alt, whole_sentence(text))
 
 
 def _over_time(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:
@@ -256,48 +255,11 @@ def _drawn(path: model.PathSummary, rows: Rows) -> Rows:
     return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
-def strategies_shown(path: model.PathSummary) -> list[list[str]]:
-    """Rows of the comparison: the programme, and each strategy."""
-    if not path.avoidance:
-        return []
-    rows = [
-        [
-            tr("as programmed"),
-            "0.00",
-            "0.00",
-            _ratio(path.max_joint_speed_ratio),
-            _ratio(path.max_joint_acceleration_ratio),
-            _clearance(path.clearance),
-            fixed(path.duration_s, 2),
-            tr("the path to be repaired"),
-        ]
-    ]
+def strategies_shown(path: model.PathSummary) -> list[str]:
+    """Each strategy with what it costs, or why it can't be used; that which is chosen has an arrow."""
+    rows = []
     for tried in path.avoidance:
-        name = strategy_word(tried.name) + (" ←" if tried.name == path.strategy else "")
-        if tried.motion is None:
-            rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
-        else:
-            remark = tr("not usable: {reason}", reason=reasons(tried)) if tried.reasons else ""
-            rows.append([name, *_costs(tried.motion), remark])
+        why = tr("Not used: {strategy}: {reason}", strategy=strategy_word(tried.name), reason=reasons(tried))
+        text = why if tried.reasons or tried.motion is None else strategy_text(path, tried)
+        rows.append(text + (" ←" if tried.name == path.strategy else ""))
     return rows
-
-
-def _costs(motion: model.StrategyMotion) -> list[str]:
-    return [
-        fixed(motion.max_deviation_mm, 2),
-        fixed(motion.max_deviation_deg, 2),
-        _ratio(motion.max_joint_speed_ratio),
-        _ratio(motion.max_joint_acceleration_ratio),
-        _clearance(motion.clearance),
-        fixed(motion.duration_s, 2),
-    ]
-
-
-def _clearance(found: model.MinClearance | None) -> str:
-    return bracketed(fixed(found.least_mm, 0), say(found.between)) if found else "–"
-
-
-def _ratio(value: float | None) -> str:
-    if value is None:
-        return tr("no bound")
-    return f"> {FAR:g}" if value > FAR else fixed(value, 2)
