@@ -14,7 +14,7 @@ STRATEGIES: dict[StrategyName, str] = words(
         "slow": "Slow down on the path",
         "branch": "Begin on another IK solution",
         "via_shift": "Shift a via point",
-        "via_tilt": "Tilt the tool on the way",
+        "via_tilt": "Pass a tilted via point",
         "detour": "Cross by a joint move",
         "stop": "Stop before it with an alarm",
         "planned": "Use a planned motion",

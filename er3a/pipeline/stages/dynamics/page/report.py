@@ -189,7 +189,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
             payload,
         ],
         (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
-        None if limited else Fix(tr("give the motors' peak torques in the robot's file."), "#motors", False),
+        None if limited else Fix(tr("enter the motors' peak torques."), "#motors", False),
     )
 
 
