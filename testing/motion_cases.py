@@ -143,7 +143,7 @@ def _written(spec):
 
 
 NO_BODIES: Any = None
-NOTHING_MET = ClearanceAlong(np.empty(0), np.empty(0), (), (), 0)
+NOTHING_MET = ClearanceAlong(np.empty(0), np.empty(0), (), np.empty(0, int), (), 0)
 
 
 def judged(robot, written, samples, limits: JointLimits) -> tuple[Motion, Judgement]:

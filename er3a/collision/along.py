@@ -95,6 +95,7 @@ class ClearanceAlong:
     ----------
     t : (K,), s, rising; distance : (K,), m, negative by the depth of overlap, NaN where the motion is unknown
     pair : K, what is nearest to what; None where that is unknown or nothing can meet
+    number : (K,), which of the bodies' pairs that is; -1 where there is none
     contacts : stretches of overlap, in order of time
     measured : number of arm poses at which distances were measured
     """
@@ -102,6 +103,7 @@ class ClearanceAlong:
     t: Reals
     distance: Reals
     pair: tuple[Pair | None, ...]
+    number: Integers
     contacts: tuple[Contact, ...]
     measured: int
 
@@ -222,12 +224,15 @@ def clearance_along(
 
     Returns
     -------
-    along : distances in m at ``shown`` and at all times at which every pair was measured; and the contacts
+    along : distances in m at ``shown`` and at all times at which every pair was measured; and the contacts. Links that
+        touch by design at their joint count only on motions on which they overlap elsewhere, there all along: so the
+        distance has no jump where they begin to
     """
     motion = _Motion(bodies, joints, rates)
     every = np.arange(len(bodies.pairs))
     if not every.size:
-        return ClearanceAlong(shown, np.full(len(shown), np.nan), (None,) * len(shown), (), 0)
+        none = len(shown)
+        return ClearanceAlong(shown, np.full(none, np.nan), (None,) * none, np.full(none, -1), (), 0)
     times, q, travel = _fine(motion, t, 2 * depth)
     reached = np.isfinite(q[:, 0])
     for i in np.flatnonzero(np.isin(times, shown) & reached):
@@ -242,11 +247,13 @@ def clearance_along(
     at = np.array(sorted(time for time, found in motion.known.items() if not np.isnan(found).any()))
     at = np.union1d(at, shown[~np.isin(shown, at)])
     unknown = np.full(len(every), np.nan)
-    rows = bodies.counted(np.array([motion.known.get(time, unknown) for time in at]))
+    rows = np.array([motion.known.get(time, unknown) for time in at])
+    rows[:, bodies.joined & ~(rows <= 0).any(axis=0)] = np.inf
     blind = np.asarray(np.isnan(rows).any(axis=1) | np.isinf(rows).all(axis=1))
     distance = np.where(blind, np.nan, rows.min(axis=1))
-    pair = tuple(None if b else bodies.pairs[int(np.argmin(row))] for b, row in zip(blind, rows))
-    return ClearanceAlong(at, distance, pair, tuple(contacts), len(motion.known))
+    number = np.where(blind, -1, rows.argmin(axis=1))
+    pair = tuple(None if k < 0 else bodies.pairs[k] for k in number)
+    return ClearanceAlong(at, distance, pair, number, tuple(contacts), len(motion.known))
 
 
 def _fine(motion: _Motion, t: Reals, step: float) -> tuple[Reals, Reals, Reals]:

@@ -41,6 +41,8 @@ STATES: dict[PairState, str] = words(
 TEXTS = texts(
     {
         "pair": "{bodies:body and }",
+        "hits": "hits [{solid:own}][itself{solid:!}]",
+        "least_clearance": "least clearance {far_mm:.1f} mm: {pair}",
         "why.decided": "Decided in the robot or scene file: {reason:own}",
         "why.undecided": "Neither proven apart nor found to collide, in {boxes} ranges of joint values; checked.",
         "why.overlaps": (
@@ -104,6 +106,11 @@ def _(found: Finding) -> str:
 
 
 same_text("colliding", "colliding_path", "colliding_target")
+
+
+def hit_word(pair: Finding) -> str:
+    """What an arm, or what it carries, hits, in two words."""
+    return sentence("hits", solid=pair.params.get("solid"))
 
 
 @says("collision.home_collides")

@@ -213,13 +213,15 @@ def quantity_word(quantity: model.Quantity) -> str:
     return word("dynamics.quantity", QUANTITIES, quantity)
 
 
-@says("dynamics.use")
 def use_text(use: model.Use | Finding) -> str:
     """What is asked for and allowed, where."""
     joint = f"J{use.joint}" if use.joint else ""
     what = joined([quantity_word(use.quantity), joint, use.path or ""], ", ")
     parts = {"asked": use.asked, "allowed": use.allowed, "unit": use.unit, "ratio": use.asked / use.allowed}
     return sentence("dynamics.use", what=what, **parts)
+
+
+says("dynamics.use")(use_text)
 
 
 @says("dynamics.no_limits", "dynamics.fits", "dynamics.marginal", "dynamics.overload")

@@ -11,13 +11,13 @@ from er3a.planning.names import StrategyName
 
 STRATEGIES: dict[StrategyName, str] = words(
     {
-        "slow": "Keep the path and slow down",
-        "branch": "Switch to another IK solution first",
-        "via_shift": "Route the path through a shifted via point",
-        "via_tilt": "Route the path through a tilted via point",
-        "detour": "Cross the region by a joint move",
-        "stop": "Stop before the region with an alarm",
-        "planned": "Use another motion instead, planned in joint space",
+        "slow": "Slow down on the path",
+        "branch": "Begin on another IK solution",
+        "via_shift": "Shift a via point",
+        "via_tilt": "Pass a tilted via point",
+        "detour": "Cross by a joint move",
+        "stop": "Stop before it with an alarm",
+        "planned": "Use a planned motion",
     }
 )
 

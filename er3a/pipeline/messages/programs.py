@@ -164,7 +164,7 @@ TEXTS = texts(
         "remedy.limit": "Keep J{joint} within {limit:g}°; turn or move a target given as a pose.",
         "remedy.solid": (
             "[Add a via point around {name}: the target itself is clear.{there:!}][Move the target away from "
-            "{name}: they overlap there.{there:?}]"
+            "{name}.{there:?}]"
         ),
         "remedy.links": (
             "Keep these links apart: give the target another place, orientation or configuration, or add a via point."

@@ -40,7 +40,6 @@ KINDS: dict[model.PathKind, str] = words(
         "plan": "planned motion",
     }
 )
-BY_JOINTS: tuple[StrategyName, ...] = ("branch", "detour", "planned")  # ways that no path of the tool shows
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
@@ -84,22 +83,21 @@ TEXTS = texts(
             "workpiece nearer{first:!}]"
         ),
         "advice.end": (
-            "End it at t = {t_s:.4g} s: [{margin:.1f} mm clear after the stop][{margin:!}{left_s:.2f} s before the "
-            "first fault]. It is at ({xyz_mm:.1f, }) mm then; a stop takes {stop_s:.2f} s"
+            "End at {t_s:.4g} s, [{margin:.1f} mm clear][{margin:!}{left_s:.2f} s before faults]. It is at "
+            "({xyz_mm:.1f, }) mm then; a stop takes {stop_s:.2f} s[{margin:?} and stays as clear]"
         ),
-        "advice.slow_there": "Slow to {percent} % from t = {start:.2f} to {end:.2f} s",
+        "advice.slow_there": "Slow to {percent} % from {start:.2f} to {end:.2f} s",
         "advice.no_part": "Run no part of it",
         "advice.near": "it begins near a singular pose",
-        "advice.clear": "{clearance:.1f} mm clear",
-        "advice.slowly": "It is quicker than the {programmed:.2f} s programmed: another motion",
         "advice.region": "It still passes near the singular pose",
-        "advice.tool": "[{far} mm, {turned}° off the path][stays on the path{far:!}]",
-        "advice.swing": "J{joint} turns by {swing:.0f}°",
+        "advice.repair": (
+            "{way}[: {far} mm off]. [{takes:.2f} s, not {programmed:.2f} s]"
+            "[Same time{takes:!}][; the tool turned by {turned}°][; {clearance:.1f} mm clear]"
+        ),
         "advice.switch": (
             "[It begins at other joint angles ({changes:, }): the way there was not checked][The move to the other "
             "solution is part of it and was checked{changes:!}]"
         ),
-        "advice.time": "[{takes:.2f} s, not {programmed:.2f} s][same time{takes:!}]",
     }
 )
 
@@ -335,47 +333,48 @@ def reasons(tried: model.TriedStrategy) -> str:
 
 def repair_text(path: model.PathSummary, slowed: Slowed | None = None, switch: str = "") -> str:
     """All that is said of the strategy that was chosen; ``switch``: of its start, as :func:`switch_text` says it."""
-    tried, motion = _chosen(path)
-    passes = path.singularities and not path.in_joint_space and not motion.keeps_clear
-    quicker = tried.name == "planned" and motion.duration_s < path.duration_s
-    swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in path.sliding}
-    joint = max(swings, key=swings.__getitem__, default=0) if tried.name in BY_JOINTS else 0
-    facts = [
-        sentence("advice.swing", joint=joint, swing=swings[joint]) if joint else "",
-        sentence("advice.slowly", programmed=path.duration_s) if quicker else "",
-        sentence("advice.region") if passes else "",
-    ]
-    return sentence("finding", finding=joined([repair_lead(path, slowed), *facts, switch, whole_pace(path)], ". "))
+    motion = _chosen(path).motion
+    passes = path.singularities and not path.in_joint_space and motion and not motion.keeps_clear
+    near = sentence("advice.region") if passes else ""
+    return sentence("finding", finding=joined([repair_lead(path, slowed), near, switch, whole_pace(path)], ". "))
 
 
 def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
     """What the strategy that was chosen does, and what it costs."""
-    tried, motion = _chosen(path)
-    far, turned = motion.max_deviation_mm, motion.max_deviation_deg
-    stays = far < NO_DEVIATION and turned < NO_DEVIATION
-    tool = sentence("advice.tool", far="" if stays else _shortly(far), turned=_shortly(turned))
+    return strategy_text(path, _chosen(path), slowed)
+
+
+def strategy_text(path: model.PathSummary, tried: model.TriedStrategy, slowed: Slowed | None = None) -> str:
+    """What a strategy that is possible does, and what it costs."""
+    motion = tried.motion
+    if motion is None:
+        raise ValueError(f"{path.name} has no motion by {tried.name}")
     clearance = math.floor(10 * motion.clearance.least_mm) / 10 if motion.clearance else None
     way = strategy_word(tried.name)
     if slowed:
         percent = math.floor(100 * slowed.part)
         way = sentence("advice.slow_there", start=slowed.start_s, end=slowed.end_s, percent=percent)
-    clear = "" if clearance is None else sentence("advice.clear", clearance=clearance)
-    takes = None if abs(motion.duration_s - path.duration_s) < NO_TIME else motion.duration_s
-    time = sentence("advice.time", takes=takes, programmed=path.duration_s)
-    parts = joined([tool, time, clear])
-    return sentence("path.cause", event=way, pose=parts)
+    return sentence(
+        "advice.repair",
+        way=way,
+        far=_shortly(motion.max_deviation_mm),
+        turned=_shortly(motion.max_deviation_deg),
+        takes=None if abs(motion.duration_s - path.duration_s) < NO_TIME else motion.duration_s,
+        programmed=path.duration_s,
+        clearance=clearance,
+    )
 
 
-def _chosen(path: model.PathSummary) -> tuple[model.TriedStrategy, model.StrategyMotion]:
-    tried = path.chosen
-    if tried is None or tried.motion is None:
+def _chosen(path: model.PathSummary) -> model.TriedStrategy:
+    if path.chosen is None:
         raise ValueError(f"{path.name} has no motion that repairs it")
-    return tried, tried.motion
+    return path.chosen
 
 
-def _shortly(value: float) -> str:
+def _shortly(value: float) -> str | None:
+    """A deviation, mm or deg, in two digits; None where there is none."""
     if value < NO_DEVIATION:
-        return "0"
+        return None
     return f"{value:.2g}" if value < WHOLE else f"{value:.0f}"
 
 

@@ -67,7 +67,7 @@ class Fault:
     ``moments``: of a path what fails first, then what fails later and weighs more, then what only follows from it; of
     a program what weighs most, then what fails before that. ``cause``: what all of it comes from, such as a singular
     pose, empty where nothing is known.
-    ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that.
+    ``status`` and ``verdict``, in few words: of all of it; ``meant``: whether its file expects that.
     ``address``: of the place on the robot's pages, which the player shows there; ``instead``: a motion that may be run,
     and where the player shows it.
     """
@@ -151,14 +151,13 @@ def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:
     return [*([Part(end, 1.0, "none")] if end < 0.995 else []), *parts]
 
 
-def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0, note: str = "") -> ListRow:
+def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0) -> ListRow:
     """A path or program that may not be run as it is, as a row of the list at the picture's side.
 
     Parameters
     ----------
     motion : that the player shows; None where it shows none, as of one with no two moments
     duration_s : of the whole motion, s, where the arm does not get to its end
-    note : in few words why; its verdict if empty
 
     Returns
     -------
@@ -170,7 +169,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0, n
     return ListRow(
         "fail" if fault.status == "fail" else "caution",
         fault.name,
-        note or fault.verdict,
+        fault.verdict,
         f"#{fault.name}",
         (fault.name, min(gravest, default=seen or 0.0)) if motion else None,
         float(bool(parts)),

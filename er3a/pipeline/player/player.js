@@ -11,7 +11,7 @@ import { constantLinks } from "er3a/kinematics";
 import { alongArm, Arm, ARM, Space, WORLD } from "er3a/space";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
-const FAINT = 0.15; // of a body that hides the arm, or is larger
+const [FAINT, SEEN_THROUGH] = [0.15, 0.5]; // of a body that hides the arm or is larger, and of one that it is in
 const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
 const SLOW = 60; // ms between two frames: the next ones have fewer pixels
@@ -23,7 +23,7 @@ const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, nowShown] = ["arm", "motion", "time", "clock", "now-shown"].map(part);
-const unjudged = document.querySelector(".answer .no_verdict") && { events: [], marks: [], text: words.not_judged }; // of a wrong table
+const unjudged = document.querySelector(".answer .no_verdict") && { events: [], marks: [], ...(data.others.length ? {} : { text: words.not_judged }) }; // of a wrong table
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const floor = data.floor ?? column(table.base, 3)[2];
 
@@ -38,7 +38,6 @@ const arms = [data, ...data.others].map((arm, k) => ({
   table: arm.table, links: constantLinks(arm.table), shown: new Arm(space, arm, k === 0 ? data.carried : []),
 }));
 const surroundings = space.add(data.scene);
-space.turn(data.turned, 0);
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
 const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
   return { place, value: place.querySelector(".value"), room: place.querySelector(".room") };
@@ -116,13 +115,15 @@ function draw() {
   const poses = arms.map((arm, k) => posesOf(arm, valuesAt(motion.times, motion.values[k], t)));
   const { page } = space;
   if (space.target !== motion.target) Object.assign(space, { target: motion.target, distance: (space.distance * motion.length) / space.length, length: motion.length });
+  if (space.turned !== motion.turned) Object.assign(space, { azimuth: space.azimuth + motion.turned - (space.turned ?? 0), turned: motion.turned });
   space.begin();
   space.floor(column(table.base, 3), data.size / 10, floor);
-  arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
+  const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
+  arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
   others.forEach((own, k) => sticks(own, data.solutions[k], poses[0], others.length > 1 ? String(k + 1) : ""));
   const hiding = space.hiding(surroundings, poses.flat());
-  space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && FAINT);
+  space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && (touching.has(mesh.shape.name) ? SEEN_THROUGH : FAINT));
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
@@ -183,7 +184,6 @@ function tellLoads(poses) {
   });
 }
 
-/** Names where a motion starts and where it ends. */
 function nameEnds(trail) {
   const [first, last] = [trail[0], trail.at(-1)];
   if (trail.every((point) => Math.hypot(...subtract(point, first)) < CLOSED * data.size)) return; // at rest

@@ -16,7 +16,7 @@ from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, tr
-from er3a.pipeline.player.motions import PlayedMotion
+from er3a.pipeline.player.motions import PlayedMotion, Weight
 from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at, stand
 from er3a.pipeline.viewing.page import packed_text, page_environment
 from er3a.pipeline.viewing.palette import DOUBTFUL, INK, REFERENCE, SOLUTIONS, TOUCHING
@@ -32,8 +32,10 @@ FARTHEST = 1.15  # of the arm's size, from its base: what is farther need not be
 MARGIN = 0.12  # of the arm's size, around what is to be seen: links are thick
 TURNED = 0.7  # rad, by which the eye looks at arms along y from another side
 TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which the arm is seen best
-HIDDEN_COSTS, TURN_COSTS = 2.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
-WAY_COUNTS = 2.0  # in a view, to the arm: it is shorter
+HIDDEN_COSTS, TURN_COSTS = 1.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
+WAY_COUNTS = 1.0  # in a view, to the arm
+GRAVEST: tuple[Weight, ...] = ("fail", "caution", "plain")  # the last such moment is seen from the side
+VIEW = ("turned", "length", "target")
 FRAMED = 9  # moments of a motion that the picture holds
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
@@ -79,11 +81,15 @@ def player(
     data["opened"] = opened if opened and opened[0] in named else (shown[0].name, float(shown[0].t[0]))
     first = named[data["opened"][0]]
     robots = (robot, *beside)
-    q = [_at(first, first.q, data["opened"][1]), *first.ghosts]
-    data["turned"] = TURNED if beside else _turned(robot, q, forward(robot, first.q)[:, :3, 3], data)
-    data |= _frame(data, robots, first)
+    turned = TURNED
     for own, motion in zip(data["motions"], shown):
-        own |= _frame(data, robots, motion)
+        if motion.events and not beside:  # what nothing is said of is the one before it in another way, and seen alike
+            gravest = min(reversed(motion.events), key=lambda event: GRAVEST.index(event.status))
+            seen = data["opened"][1] if motion is first else gravest.t
+            q = [_at(motion, motion.q, seen), *motion.ghosts]
+            turned = _turned(robot, q, forward(robot, motion.q)[:, :3, 3], data)
+        own |= _frame(data, robots, motion, turned) | {"turned": turned}
+    data |= {key: own[key] for own in data["motions"] if own["name"] == first.name for key in VIEW}
     return Markup(
         page_environment(_HERE)
         .get_template("player.html.j2")
@@ -156,9 +162,9 @@ def _corners(shape: Shape) -> Reals:
     return corners
 
 
-def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion) -> dict[str, Any]:
+def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, turned: float) -> dict[str, Any]:
     """How much has to be seen (m), and around which point, for the picture to hold the arms on their ways and what is
-    around them, as far as that is near."""
+    around them, as far as that is near; ``turned``, rad: of the eye."""
     bodies = [each for each in data["scene"] if not each.get("large") and ("pale" not in each or "own" in each)]
     points = [_corners(shape) for shape in bodies]
     for robot, q in zip(robots, (motion.q, *motion.beside)):
@@ -167,7 +173,7 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion) 
     points += [np.array([mark.start]) for mark in motion.marks]
     middle, far = robots[0].base[:3, 3], FARTHEST * data["size"] + np.ptp([each.base[:3, 3] for each in robots], axis=0)
     seen = np.clip(np.concatenate(points), middle - far, middle + far)
-    axes = axes_of(AZIMUTH + data["turned"], ELEVATION)
+    axes = axes_of(AZIMUTH + turned, ELEVATION)
     across = seen @ axes.T
     middle = (across.min(axis=0) + across.max(axis=0)) / 2
     across -= middle

@@ -112,19 +112,16 @@ def path_clearances(
             continue
         along = measured(bodies, tolerance, motion)
         q = motion.joints(along.t)
-        known = np.isfinite(along.distance)
         near = np.full((len(q), 2, 3), np.nan)
-        pair = np.full(len(q), -1)
-        pair[known] = bodies.min_distance(q[known])[1]
-        for row in np.flatnonzero(pair >= 0):
-            near[row] = bodies.surface_points(q[row], pair[row])
+        for row in np.flatnonzero(along.number >= 0):
+            near[row] = bodies.surface_points(q[row], along.number[row])
         tables.append(
             model.PathClearances.of(
                 path=entry.name,
                 t_s=along.t,
                 q_deg=shown(bodies.robot, q),
                 clearance_mm=along.distance * 1000,
-                between=[label_of(bodies.pairs[k]) if k >= 0 else "" for k in pair],
+                between=[label_of(pair) if pair else "" for pair in along.pair],
                 from_mm=near[:, 0] * 1000,
                 to_mm=near[:, 1] * 1000,
             )
@@ -132,9 +129,9 @@ def path_clearances(
         if along.contacts:
             first[entry.name] = along.contacts[0].pairs[0]
         at = along.closest
-        if at >= 0 and pair[at] >= 0:
+        if at >= 0 and along.number[at] >= 0:
             about = (entry.name, "path", float(along.t[at]))
-            closest.append(_closest(bodies, about, q[at], along.distance[at], pair[at]))
+            closest.append(_closest(bodies, about, q[at], along.distance[at], along.number[at]))
     return model.PathClearances.stacked(tables).of_joints(bodies.robot.slides), closest, first
 
 

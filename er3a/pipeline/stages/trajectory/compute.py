@@ -284,7 +284,6 @@ def _motion(robot: Robot, cost: StrategyCost, clearance: model.MinClearance | No
         max_deviation_mm=from_si("mm", cost.distance.max()),
         max_deviation_deg=from_si("deg", cost.angle.max()),
         duration=cost.motion.duration,
-        joint_swing_deg=tuple(shown(robot, np.ptp(cost.motion.q, axis=0)).tolist()),
         max_joint_speed=np.abs(cost.motion.velocity).max(axis=0),
         max_joint_acceleration=np.abs(cost.motion.acceleration).max(axis=0),
         clearance=clearance,

@@ -161,7 +161,6 @@ class StrategyMotion:
     ----------
     done_ratio : how much of the path is done, 0..1
     keeps_clear : whether the arm keeps its distance from singular poses wherever the tool is on or beside the path
-    joint_swing_deg : between the extremes of each joint; mm where it slides
     clearance : None where none was measured
     """
 
@@ -170,7 +169,6 @@ class StrategyMotion:
     max_deviation_deg: float
     duration_s: float
     keeps_clear: bool
-    joint_swing_deg: tuple[float, ...]
     max_joint_speed_deg_s: tuple[float, ...]
     max_joint_speed_ratio: float
     max_joint_acceleration_deg_s2: tuple[float, ...]

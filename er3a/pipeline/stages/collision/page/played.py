@@ -6,7 +6,7 @@ import numpy as np
 
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import sentence
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.collision.model import Closest, CollisionResults, PathClearances
@@ -65,8 +65,7 @@ def _inside(bodies: tuple[str, ...], clearance_mm: float) -> str:
 
 
 def _least(found: Closest) -> PlayedEvent:
-    text = tr("least clearance {clearance} mm: {pair}", clearance=fixed(found.clearance_mm, 1), pair=say(found.between))
-    t = found.t_s or 0.0
+    text, t = sentence("least_clearance", far_mm=found.clearance_mm, pair=found.between), found.t_s or 0.0
     return PlayedEvent(t, t, text, "plain")
 
 

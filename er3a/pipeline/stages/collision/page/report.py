@@ -6,19 +6,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from markupsafe import Markup
 
 from er3a.collision.pairs import TRIED
-from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, tr, with_unit
+from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.motions import fix_of
+from er3a.pipeline.player.motions import at_rest, fix_of
 from er3a.pipeline.player.player import drawing_head, player
-from er3a.pipeline.player.turning import Layer, surroundings, turning_figure
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
@@ -27,25 +24,7 @@ from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, all_caught
 from er3a.pipeline.viewing.page import render_stage
-from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
-
-PLACE_PX = 5.0
-
-
-def _places(robot: Robot, results: model.CollisionResults, scene: Scene | None) -> Markup:
-    """The middles of the cells that are reached, by what is left of them, in a figure that turns."""
-    rows = results.places
-    groups = (
-        (tr("connected to home"), rows.joined, VERDICTS["pass"]),
-        (tr("clear, not connected"), rows.clear & ~rows.joined, MODEL),
-        (tr("lost"), ~rows.clear, VERDICTS["fail"]),
-    )
-    layers = [Layer(name, rows.middle_mm[own], colour, PLACE_PX, cut=True) for name, own, colour in groups if own.any()]
-    return (
-        turning_figure(layers, solids=surroundings(robot, scene), cut_m=float(robot.base[1, 3])) if layers else Markup()
-    )
-
 
 NO_BREAK_SPACE = "\u00a0"
 MAX_ROWS = 100  # of the list of targets and paths
@@ -57,11 +36,9 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     robot = study.robot(name)
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
-    inside = results.paths.take(results.paths.clearance_mm < 0)
-    firsts = dict(zip(inside.path[::-1].tolist(), inside.t_s[::-1].tolist()))
     # A path of which a part can't be reached is clear of nothing.
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
-    answer = _answer(summary, closest, unreached, firsts, _advice(stored.folder))
+    answer = _answer(summary, closest, unreached, _advice(stored.folder))
     render_stage(
         study,
         stored,
@@ -70,10 +47,9 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         matrix=_matrix(robot, results.matrix),
         never_met=int((results.matrix.state == "never").sum()),
         tried=TRIED,
-        places=_places(robot, results, scene),
         player=player(
             robot,
-            [*motions(robot, results), *poses(robot, results)],
+            [*motions(robot, results), *poses(robot, results)] or [at_rest(robot, own_title(robot.title))],
             scene,
             opened=next((group.rows[0].play for group in answer.shown_groups), None),
         ),
@@ -87,19 +63,17 @@ def _answer(
     summary: model.CollisionSummary,
     closest: Sequence[model.Closest],
     unreached: set[str],
-    firsts: Mapping[str, float],
     advice: Mapping[str, Fix],
 ) -> Answer:
     """How many paths and chosen solutions are clear of everything, and how near each comes.
 
     What collides as its file expects is named, and so is a path of which only a part was measured: that is clear of
-    nothing. ``unreached``: these; ``firsts``: when (s) paths first touch something, and ``advice``: what may be run
-    instead of a path, by their names.
+    nothing. ``unreached``: these; ``advice``: what may be run instead of a path, by its name.
     """
     params = summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
-    most = max((each.clearance_mm for each in closest), default=1.0)
-    rows = [_row(each, unreached, near, firsts, advice, most) for each in closest]
+    most = max((abs(each.clearance_mm) for each in closest), default=1.0) or 1.0
+    rows = [_row(each, unreached, near, advice, most) for each in closest]
     hit, clear, partly = (
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
@@ -145,24 +119,22 @@ def _row(
     found: model.Closest,
     unreached: set[str],
     near: Sequence[str],
-    firsts: Mapping[str, float],
     advice: Mapping[str, Fix],
     most_mm: float,
 ) -> ListRow:
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
     which only a part was measured.
 
-    The bar is the clearance in parts of ``most_mm``."""
+    The bar is the clearance, or the depth of an overlap, in parts of ``most_mm``."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     of_path = found.kind == "path"
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     if of_path and found.name in unreached and mark != "fail":
         mark = "none"
-    bar = [Part(0.0, 1.0, mark)] if mark == "none" else []
+    bar = [Part(0.0, 1.0, mark)] if mark in ("none", "fail") else []
     fix = advice.get(found.name) if mark == "fail" and of_path else None
-    length = max(0.0, found.clearance_mm) / most_mm
-    seen = firsts.get(found.name, found.t_s) if of_path else None
-    return ListRow(mark, found.name, note, "", (found.name, seen or 0.0), length, bar, fix)
+    length = abs(found.clearance_mm) / most_mm
+    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, bar, fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

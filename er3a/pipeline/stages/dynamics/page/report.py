@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.pipeline.language import own_title, tr, with_unit, words
-from er3a.pipeline.messages.dynamics import BINDING, payload_key, payload_text, quantity_word
+from er3a.pipeline.messages.dynamics import BINDING, payload_key, payload_text, use_text
 from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of_column, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, word
 from er3a.pipeline.player.motions import at_rest
@@ -26,6 +26,7 @@ from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
+TALL = 4.3  # inches, of figures at the side of the player
 KEY: dict[str, Any] = {
     "fontsize": 10,
     "handlelength": 1.2,
@@ -37,7 +38,7 @@ KEY: dict[str, Any] = {
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     """Torques of all joints with their intervals, and what most of the greatest comes from."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, torque = new_figure(width=5.2, height=3.6)
+    figure, torque = new_figure(width=5.2, height=TALL)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     for j in range(rows.torque.shape[1]):
         colour = JOINTS[j % len(JOINTS)]
@@ -70,6 +71,7 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
     texts = [f"{with_unit(number(m, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}" for m, way in zip(kg, far)]
     names = [tr("link {number}", number=each.link) for each in links]
     figure, ax = bars(names, torques, texts, [JOINTS[each.link - 1] for each in links])
+    figure.set_figheight(TALL)
     ax.set_xlabel(axis_label(model.TorqueRows, "torque", held.unit))
     caption = tr("What each link adds to J{joint}: its mass times its level distance.", joint=held.joint)
     return Picture(figure, caption, caption)
@@ -101,7 +103,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         payload=payload_text(summary, robot),
         findings=listed(summary.findings),
         links=_links(summary),
-        uses=[_use(use) for use in summary.uses[:MAX_USES]],
+        uses=[use_text(use) for use in summary.uses[:MAX_USES]],
         motors=_motors(summary.motors),
         limited=_limited(summary),
         paths=[_path(path) for path in summary.paths if path.counts],
@@ -114,7 +116,6 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
             opened=_opened(results, _worst(summary.motors)) if summary.motors else None,
         ),
         drawing_head=drawing_head(),
-        wrist=_wrist(summary),
         units=_units(summary),
         held=_held(summary.holding),
     )
@@ -149,10 +150,9 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     worst = _worst(summary.motors)
     limited = _limited(summary)
     over = [f"J{motor.joint}" for motor in summary.motors if _mark(motor) == "fail"]
+    headline = tr("Within all limits.") if limited else tr("J{joint} bears most.", joint=worst.joint)
     if over:
         headline = tr("Too much for {joints}.", joints=joined(over, ", "))
-    else:
-        headline = tr("Within all limits.") if limited else tr("Cannot judge: motor limits missing.")
     moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
@@ -181,7 +181,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
     return Answer(
         headline,
-        "",
+        "" if limited or over else tr("Motor limits are missing."),
         tr("At least: without {parts}.", parts=joined(left, ", ")) if left else "",
         [
             (moving, tr("J{joint} moving", joint=worst.joint)),
@@ -189,7 +189,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
             payload,
         ],
         (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
-        None if limited else Fix(tr("give the motors' peak torques in the robot's file."), "#motors", False),
+        None if limited else Fix(tr("enter the motors' peak torques."), "#motors", False),
     )
 
 
@@ -232,26 +232,11 @@ def _links(summary: model.DynamicsSummary) -> list[list[str]]:
     return rows
 
 
-def _use(use: model.Use) -> list[str]:
-    return [
-        quantity_word(use.quantity),
-        f"J{use.joint}" if use.joint else NONE,
-        use.path or tr("at rest"),
-        number(use.asked, 3),
-        at_most(use.upper, ""),
-        number(use.allowed, 3),
-        use.unit,
-        fixed(100 * use.ratio, 0),
-    ]
-
-
 def _units(summary: model.DynamicsSummary) -> dict[str, str]:
-    """Units of torques, speeds and inertias in headings, by what the arm's joints do."""
+    """Units of torques and speeds in headings, by what the arm's joints do."""
     torque = model.shared_unit(held.unit for held in summary.holding)
-    turning, sliding = ("°/s", "kg m²"), ("mm/s", "kg")
-    of_others = {model.TORQUE: turning, model.FORCE: sliding}
-    speed, inertia = of_others.get(torque, (tr("°/s or mm/s"), tr("kg m² or kg")))
-    return {"torque": tr(torque), "speed": speed, "inertia": inertia}
+    speeds = {model.TORQUE: "°/s", model.FORCE: "mm/s"}
+    return {"torque": tr(torque), "speed": speeds.get(torque, tr("°/s or mm/s"))}
 
 
 def _label(joint: int, unit: model.Unit) -> str:
@@ -261,27 +246,15 @@ def _label(joint: int, unit: model.Unit) -> str:
 def _motors(motors: Sequence[model.MotorNeed]) -> list[list[str]]:
     torque = decimals_of_column(value for motor in motors for value in (motor.peak, motor.holding))
     power = decimals_of_column(motor.power_w for motor in motors)
-    inertia = decimals_of_column(motor.inertia_high for motor in motors)
-    return [_motor(motor, torque, power, inertia) for motor in motors]
-
-
-def _motor(motor: model.MotorNeed, torque: int, power: int, inertia: int) -> list[str]:
     return [
-        _label(motor.joint, motor.unit),
-        *(fixed(value, torque) for value in (motor.peak, motor.rms, motor.holding)),
-        fixed(motor.speed, 1),
-        fixed(motor.power_w, power),
-        " – ".join(dict.fromkeys((fixed(motor.inertia_low, inertia), fixed(motor.inertia_high, inertia)))),
-        *(
-            NONE if value is None else number(value, 3)
-            for value in (
-                motor.inertia_ratio,
-                motor.motor_torque,
-                motor.motor_rpm,
-                motor.rated_limit,
-                motor.peak_limit,
-            )
-        ),
+        [
+            _label(motor.joint, motor.unit),
+            *(fixed(value, torque) for value in (motor.peak, motor.rms, motor.holding)),
+            fixed(motor.speed, 1),
+            fixed(motor.power_w, power),
+            *(NONE if value is None else number(value, 3) for value in (motor.rated_limit, motor.peak_limit)),
+        ]
+        for motor in motors
     ]
 
 
@@ -318,17 +291,4 @@ def _held(holding: Sequence[model.HoldingTorque]) -> list[list[str]]:
             panel_link(held.q, ", ".join(fixed(value, 0) for value in held.q)),
         ]
         for held in holding
-    ]
-
-
-def _wrist(summary: model.DynamicsSummary) -> list[list[str]]:
-    return [
-        [
-            path.name,
-            f"J{moment.joint}",
-            within(moment.moment_n_m, moment.tolerance),
-            fixed(moment.t_s, 2),
-        ]
-        for path in summary.paths
-        for moment in path.wrist
     ]

@@ -11,7 +11,7 @@ import numpy as np
 from er3a.collision.pairs import names_of
 from er3a.finding import Finding, fact, is_one
 from er3a.pipeline.language import tr
-from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import times_needed
 from er3a.pipeline.messages.programs import OUT_OF_REACH, rates_text, remedies, singular_cause
@@ -136,19 +136,27 @@ def faults(results: ProgramsResults) -> list[Fault]:
         cause = _cause(program, first) or _cause(program, worst)
         shown = [worst] if worst.level == first.level else [worst, first]
         moments = tuple(_moment(program, each) for each in shown)
+        collides = is_one(worst.finding, "motion_collides")
         found.append(
             Fault(
                 program.name,
                 WEIGHTS[program.outcome],
-                outcome_word(program.outcome),
+                hit_word(worst.finding.touches[0].pair) if collides else in_few_words(moments[0].what),
                 is_met(program),
                 moments,
-                " ".join(dict.fromkeys(text for each in shown for text in remedies(_same_line(program, each))[:1])),
+                joined(dict.fromkeys(_to_do(program, each) for each in shown), " "),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
                 cause=cause,
             )
         )
     return found
+
+
+def _to_do(program: ProgramSummary, found: FindingAt) -> str:
+    """What to do about a line, after its number."""
+    texts = remedies(_same_line(program, found))[:1]
+    own = bool(texts) and bool(found.line) and found in of_line(program, found.line)
+    return tr("Line {line}: {text}", line=found.line, text=texts[0]) if own else joined(texts)
 
 
 def _cause(program: ProgramSummary, found: FindingAt) -> str:

@@ -15,7 +15,7 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
-from er3a.pipeline.stages.programs.page.played import WEIGHTS, motions, of_line, stretches
+from er3a.pipeline.stages.programs.page.played import WEIGHTS, motions, of_line, stretches, worst_first
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.palette import VERDICTS, rgb
 from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
@@ -45,7 +45,7 @@ def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> float
         stored,
         output,
         NOTE,
-        runs=[_run(results, program, played[program.name]) for program in results.summary.programs],
+        runs=[_run(results, program, played[program.name]) for program in worst_first(results)],
         scene=study.scene(stored.robot, "trajectory"),  # the stage whose scene counts here too
         views={"Arm and tool": ["**"]},
         points=[results.motion.xyz_mm / 1000],

@@ -23,7 +23,6 @@ from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.page.played import (
     cause_first,
     faults,
-    in_few_words,
     line_id,
     motions,
     stretches,
@@ -69,7 +68,7 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     """How many programs may be run, each with its bar over time, and what to do about the first of the others."""
     summary, wrong = results.summary, faults(results)
     shown = {motion.name: motion for motion in motions(robot, results)}
-    bad = {each.name: row_of(each, shown[each.name], note=in_few_words(each.moments[0].what)) for each in wrong}
+    bad = {each.name: row_of(each, shown[each.name]) for each in wrong}
     good = [each for each in summary.programs if each.name not in bad]
     sound = [
         ListRow(
@@ -78,6 +77,7 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
             _cost(float(shown[each.name].t[-1]), each.least_clearance_mm),
             f"#{each.name}",
             (each.name, 0.0),
+            1.0,
         )
         for each in good
     ]

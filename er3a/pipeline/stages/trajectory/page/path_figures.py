@@ -1,63 +1,37 @@
-"""The figure of a path: curves and measures over one time.
-
-Layout is fixed: finding places takes longer than drawing.
-"""
+"""Figures of a path over its time: its joints, what fails, or how near it comes to anything."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 
 from er3a.finding import Finding
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
-from er3a.pipeline.messages.kinematics import singularity_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
 from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture
-from er3a.robots.joint_limits import shown
-from er3a.robots.robot import Robot
 
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show
-NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
-TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
-ROWS = 4  # of axes, below one another
-LEFT, BOTTOM, TOP, WIDTH = 0.09, 0.06, 0.95, 0.89
-FONT = 9.0
+OFF = 0.005  # mm or deg, from which on a repair counts as off the path
 
 
-def path_picture(
-    robot: Robot, path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds, alt: str, caption: str
-) -> Picture:
-    """Joint curves of a path, below them its distances from singular poses, all over one time.
-
-    Parameters
-    ----------
-    rows : of the path, as many as its curves need
-    near : from where on a pose counts as near a singular one
-    """
-    figure = Figure(figsize=(9.6, 8.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
-    *joints, distances = (_axes(figure, row) for row in range(ROWS))
-    for ax in joints:
-        ax.tick_params(labelbottom=False)
-    distances.set_xlabel(axis_label(rows, "t_s"), fontsize=FONT)
-    _joint_curves(joints, robot, path, rows)
-    _distances(distances, rows, near)
-    for ax in figure.axes:
+def path_picture(path: model.PathSummary, rows: model.PathChecks, alt: str, caption: str) -> Picture:
+    """Angles and velocities of a path's joints over one time, as many rows as the curves need."""
+    figure, axes = new_figure(rows=2, width=9.6, height=5.2, sharex=True)
+    for ax, name in zip(axes, ("q_deg", "q_deg_s")):
+        for j, values in enumerate(getattr(rows, name).T):
+            ax.plot(rows.t_s, values, color=palette.JOINTS[j], linewidth=WIDTHS[j], label=palette.JOINT_NAMES[j])
         _mark(ax, path)
+        ax.set_ylabel(axis_label(rows, name))
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
-    figure.legend(handles=_legend(path), loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT)
-    return Picture(figure, alt, caption, [(ax, path.name) for ax in figure.axes])
+    axes[0].legend(ncols=10, loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0.1)
+    axes[1].set_xlabel(axis_label(rows, "t_s"))
+    return Picture(figure, alt, caption, [(ax, path.name) for ax in axes])
 
 
 def nearness_picture(
@@ -75,7 +49,7 @@ def nearness_picture(
     shapes : the assumed ones, which may be wrong by their margin; None where none are assumed
     path : whose faults are marked; None of a motion that repairs them
     """
-    figure, ax = new_figure(width=5.2, height=2.6)
+    figure, ax = new_figure(width=5.2, height=3.0)
     ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
     if path:
         _mark(ax, path)
@@ -94,102 +68,56 @@ def nearness_picture(
     return Picture(figure, tr("Clearance"), caption, [(ax, name)])
 
 
-def fault_picture(path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> Picture:
-    """What fails on a path that meets nothing, over its time: its distances from singular poses, or where it meets none
-    and is too fast, the speed of its fastest joint in parts of the limit; below or above the dashed line it fails."""
-    figure, ax = new_figure(width=5.2, height=2.6)
-    if path.too_fast and path.verdict != "singular" and not path.unreachable:
-        title = tr("Joint speed")
-        ax.plot(rows.t_s, rows.speed_ratio, color=palette.MODEL, linewidth=2.2)
-        ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
-        ax.set_ylabel(tr("speed / limit"))
+def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.PathChecks | None = None) -> Picture:
+    """What fails on a path that meets nothing, over the time of a motion: the speed of its fastest joint in parts of
+    the limit, or else how far it is from singular poses.
+
+    Parameters
+    ----------
+    name : of the motion: the path, or what repairs it
+    rows : of the path, or of the avoidance strategy that repairs it
+    before : of the path, if the motion repairs it
+    """
+    figure, ax = new_figure(width=5.2, height=3.0)
+    fast = path.too_fast and path.verdict != "singular" and not path.unreachable
+    column = "speed_ratio" if fast else "smallest_singular_value"
+    if before is not None:
+        ax.plot(before.t_s, getattr(before, column), color=palette.MUTED, linestyle="--", label=tr("as programmed"))
+        off = (rows.deviation_mm > OFF) | (rows.deviation_deg > OFF)
+        ax.fill_between(
+            rows.t_s,
+            *(0, 1),
+            where=off.tolist(),
+            transform=ax.get_xaxis_transform(),
+            color=palette.VERDICTS["pass"],
+            alpha=0.2,
+            linewidth=0,
+            label=tr("off the path") if off.any() else None,
+        )
+        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, handlelength=1.2, ncols=2)
     else:
-        title = tr("Distance from singular poses")
-        _distances(ax, rows, near)
-    _mark(ax, path)
+        _mark(ax, path)
+    ax.plot(rows.t_s, getattr(rows, column), color=palette.MODEL, linewidth=2.2)
+    if fast:
+        ax.axhline(1.0, color=palette.TOUCHING, linewidth=1.2)
+    ax.set_ylim(bottom=0.0)
     ax.set_xlim(0.0, rows.t_s[-1])
     ax.set_xlabel(axis_label(rows, "t_s"))
-    return Picture(figure, title, "", [(ax, path.name)])
-
-
-def _axes(figure: Figure, row: int) -> Axes:
-    height = (TOP - BOTTOM) / ROWS
-    ax = figure.add_axes((LEFT, BOTTOM + (ROWS - 1 - row) * height, WIDTH, height - 0.03))
-    ax.tick_params(labelsize=FONT, length=2)
-    ax.xaxis.set_major_locator(MaxNLocator(5))
-    ax.yaxis.set_major_locator(MaxNLocator(4))
-    ax.yaxis.set_label_coords(-0.065, 0.5)
-    return ax
-
-
-def _joint_curves(axes: list[Axes], robot: Robot, path: model.PathSummary, rows: model.PathChecks) -> None:
-    for ax, name in zip(axes, ("q_deg", "q_deg_s", "q_deg_s2")):
-        values = getattr(rows, name)
-        for j in range(values.shape[1]):
-            ax.plot(rows.t_s, values[:, j], color=palette.JOINTS[j], linewidth=WIDTHS[j], label=palette.JOINT_NAMES[j])
-        ax.set_ylabel(axis_label(rows, name), fontsize=FONT)
-        if name == "q_deg":
-            _limits(ax, robot, values)
-        elif not path.joint_speed_bounded:
-            _cut(ax, values)
-
-
-def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> None:
-    """Distance from each singular set, in parts of the distance below which a pass counts as near."""
-    curves = (
-        ("wrist", rows.wrist_deg, near.wrist_deg),
-        ("elbow", rows.elbow_deg, near.elbow_deg),
-        ("shoulder", rows.shoulder_mm, near.shoulder_mm),
-    )
-    for kind, distance, threshold in curves:
-        ratio = np.maximum(np.abs(distance) / threshold, 1e-4)
-        ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=singularity_word(kind))
-    ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
-    ax.set_yscale("log")  # with ticks of its own: matplotlib's take longer than all curves
-    ax.set(ylim=(0.01, 100.0), yticks=[0.01, 0.1, 1, 10, 100], yticklabels=["0.01", "0.1", "1", "10", "100"])
-    ax.minorticks_off()
-    ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
-    legend = ax.legend(loc="lower left", ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
-    legend.set_frame_on(True)  # a ground of its own, where a curve passes behind it
-    legend.get_frame().set(facecolor="white", edgecolor="none", alpha=0.85)
-
-
-def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
-    """Dashed lines at the limits that a joint comes near to."""
-    if np.isnan(q_deg).all():
-        return
-    low, high = np.nanmin(q_deg, axis=0), np.nanmax(q_deg, axis=0)
-    lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
-    for j in np.flatnonzero(~robot.continuous):
-        for limit, gap in ((lower[j], low[j] - lower[j]), (upper[j], upper[j] - high[j])):
-            if gap < NEAR_LIMIT_DEG:
-                ax.axhline(limit, color=palette.JOINTS[j], linestyle="--", linewidth=1)
-
-
-def _cut(ax: Axes, values: Reals) -> None:
-    """Cut the axis where a curve grows without bound at the edge of reach."""
-    size = np.abs(values[np.isfinite(values)])
-    if size.size:
-        reach = 1.6 * np.percentile(size, 97)
-        ax.set_ylim(-reach, reach)
-        ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
-        text = tr("cut: grows without bound")
-        ax.text(0.99, 0.04, text, transform=ax.transAxes, ha="right", fontsize=8, bbox=ground, zorder=6)
-
-
-def _shades(path: model.PathSummary) -> list[tuple[tuple[model.Stretch, ...], str, float, str]]:
-    """Stretches that are wrong, with the colour, opacity and name of their shade."""
-    shades = [
-        (path.out_of_limits, palette.VERDICTS["caution"], 0.16, tr("outside a joint limit")),
-        (path.too_fast, palette.VERDICTS["fail" if path.fails else "caution"], 0.14, tr("joint too fast")),
-        (path.unreachable, palette.INK, 0.14, tr("not reachable")),
-        (path.collisions, palette.VERDICTS["fail"], 0.3, tr("collision")),
-    ]
-    return [shade for shade in shades if shade[0]]
+    ax.set_ylabel(tr("speed / limit") if fast else tr("smallest singular value"))
+    title = tr("Fastest joint") if fast else tr("Distance from singular poses")
+    crosses = before is not None and not fast and path.strategy == "detour"
+    return Picture(figure, title, tr("A joint move may cross the singular pose.") if crosses else "", [(ax, name)])
 
 
 def _mark(ax: Axes, path: model.PathSummary) -> None:
-    for stretches, colour, alpha, _ in _shades(path):
+    """Shade what is wrong, and mark singular poses."""
+    shades = (
+        (path.out_of_limits, palette.VERDICTS["caution"], 0.16),
+        (path.too_fast, palette.VERDICTS["fail" if path.fails else "caution"], 0.14),
+        (path.unreachable, palette.INK, 0.14),
+        (path.collisions, palette.VERDICTS["fail"], 0.3),
+    )
+    for stretches, colour, alpha in shades:
         for part in stretches:
             ax.axvspan(part.t0_s, part.t1_s, color=colour, alpha=alpha, linewidth=0)
     for event in path.singularities:
@@ -198,17 +126,3 @@ def _mark(ax: Axes, path: model.PathSummary) -> None:
         ax.plot(
             *at, "v", color=palette.HIGHLIGHT, markersize=6, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5
         )
-
-
-def _legend(path: model.PathSummary) -> list[Line2D | Patch]:
-    handles: list[Line2D | Patch] = [
-        Line2D([], [], color=palette.JOINTS[j], linewidth=WIDTHS[j], label=palette.JOINT_NAMES[j])
-        for j in range(len(path.max_joint_speed_deg_s or palette.JOINT_NAMES[:6]))
-    ]
-    for crossing, label in ((True, tr("singular")), (False, tr("near-singular"))):
-        if any(event.crossing == crossing for event in path.singularities):
-            handles.append(
-                Line2D([], [], color=palette.HIGHLIGHT, label=label, linestyle=EVENT_STYLES[crossing], marker="v")
-            )
-    handles += [Patch(color=colour, alpha=2 * alpha, label=label) for _, colour, alpha, label in _shades(path)]
-    return handles

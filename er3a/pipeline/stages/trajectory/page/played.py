@@ -12,6 +12,7 @@ from er3a.collision.pairs import names_of
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
+from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import rate_needed, times_needed
@@ -62,6 +63,9 @@ def motions(
         near = near_assumed(path, results.summary)
         text = say(near) if near else path_text(path)
         seen = [*events(path), *_near_events(path, near, results.clearance), *added(path.name)]
+        if path.verdict == "safe" and path.clearance and not near:
+            least = sentence("least_clearance", far_mm=path.clearance.least_mm, pair=path.clearance.between)
+            seen.append(PlayedEvent(path.clearance.t_s, path.clearance.t_s, least, "plain"))
         motions.append(
             PlayedMotion(
                 path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path), whole_s=path.duration_s
@@ -246,7 +250,10 @@ def shown_verdict(path: model.PathSummary, near: Finding | None) -> tuple[Weight
         return weight, tr("fault in its program") if weight == "fail" else tr("doubt in its program")
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    return weight, joined(map(outcome_word, path.outcomes), ", ")
+    said = {each: outcome_word(each) for each in path.outcomes}
+    if path.collisions:
+        said["collides"] = hit_word(path.collisions[0].cause.touches[0].pair)
+    return weight, joined(said.values(), ", ")
 
 
 def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> Finding | None:

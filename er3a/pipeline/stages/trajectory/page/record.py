@@ -26,7 +26,6 @@ from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 FRAMES_PER_SECOND = 50
-TRAIL_POINTS = 60
 GHOST_ALPHA = 110
 LABELS_APART = 0.15  # of the arm's size
 GHOST_WIDTH = 0.006  # of the arm's size
@@ -42,7 +41,6 @@ Press play: it runs along one path after another.
 {findings}
 
 - line: the path, dark where the arm is badly conditioned, grey where it can't go
-- trail behind the tool: magenta as programmed, blue on a second run, repaired
 - magenta lines: the arm at the path's singular poses
 - red: bodies and solids that overlap at that moment; magenta ball: where they first touch
 - grey solids: the scene
@@ -84,7 +82,7 @@ def runs_of_path(robot: Robot, results: TrajectoryResults, path: PathSummary) ->
         marks=contact(path),
         outcome=verdict,
         status=status,
-        shapes=[*still, *_trail(shown, HIGHLIGHT)],
+        shapes=still,
     )
     if path.chosen and path.chosen.motion:
         to_do = repair_text(path)
@@ -95,7 +93,7 @@ def runs_of_path(robot: Robot, results: TrajectoryResults, path: PathSummary) ->
             name=f"{path.name}, repaired",
             text=f"## {path.name}, repaired\n**{outcome_word('safe')}**: {to_do}.",
             outcome=f"{outcome_word('safe')}: {to_do}",
-            shapes=[*still, *_trail(repaired, MODEL)],
+            shapes=still,
         )
 
 
@@ -151,13 +149,3 @@ def _labels(path: PathSummary, points: Reals, apart: float) -> dict[int, str]:
         text = f"{'' if event.crossing else 'near '}{event_word(event)}, {event.t_s:.3f} s into the path"
         shared.setdefault(first, []).append(text)
     return {k: own[0] + (f", and {len(own) - 1} more" if own[1:] else "") for k, own in shared.items()}
-
-
-def _trail(rows: MotionRows, colour: str) -> Iterator[tuple[float, str, Logged]]:
-    """The way the tool has come so far, in TRAIL_POINTS steps; empty at the start."""
-    points, reached = rows.xyz_mm / 1000, np.isfinite(rows.q_deg[:, 0])
-    yield 0.0, "trail", rr.LineStrips3D([])
-    for i in np.unique(np.linspace(1, len(rows) - 1, TRAIL_POINTS).astype(int)):
-        so_far = points[: i + 1][reached[: i + 1]]
-        if len(so_far) > 1:
-            yield float(rows.t_s[i]), "trail", rr.LineStrips3D([so_far], colors=[rgb(colour)], radii=0.007)

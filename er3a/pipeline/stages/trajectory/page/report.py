@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from markupsafe import Markup
 
-from er3a.pipeline.language import tr, using, with_unit
+from er3a.geometry.transforms import translation
+from er3a.pipeline.language import own_title, tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.planning import FAR
-from er3a.pipeline.messages.say import bracketed, say
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import (
     kind_word,
     path_text,
     reasons,
+    strategy_text,
     strategy_word,
 )
 from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_of, opened, row_of
@@ -41,11 +43,14 @@ from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, ListRow, judged, may_run
 from er3a.pipeline.viewing.conditions import program_head
-from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
+from er3a.pipeline.viewing.page import Picture, alternative_table, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
+from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
+Rows = TypeVar("Rows", bound=model.MotionRows)
+APART = 0.6  # of an arm's size, between two
 DRAWN = 250  # points of a curve
 MAX_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
 
@@ -67,9 +72,9 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count))
         links = _programs(path, files, lines, met or {})
-        drawn = _figure(robot, path, rows, summary.near) if i < count else None
-        nearness = _nearness(path, results) if i < count else []
-        sections.append({**_section(path, drawn, links, summary), "near_over_time": nearness})
+        drawn = _figure(path, rows) if i < count else None
+        over_time = _over_time(path, results) if i < count else []
+        sections.append({**_section(path, drawn, links, summary), "over_time": over_time})
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
         study,
@@ -83,9 +88,23 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
         drawn_paths=count,
-        player=player(robot, played, scene, opened=opened(wrong.values())),
+        player=_both_arms(study, stored, played)
+        if contradicted
+        else player(robot, played, scene, opened=opened(wrong.values())),
         drawing_head=drawing_head(),
     )
+
+
+def _both_arms(study: Study, stored: Stored[model.TrajectoryResults], played: Sequence[PlayedMotion]) -> Markup:
+    """An arm whose table evidence contradicts beside that of the table to use instead, at the same joint values."""
+    robot, instead = study.robot(stored.robot), alternative_table(study, stored)
+    other = study.robot(instead) if instead else robot
+    if other is robot or other.joints != robot.joints:
+        return player(robot, played)
+    other = other.replace(base=translation(0.0, -APART * size_of(robot), 0.0) @ other.base)
+    text = tr("The same joint angles, another pose.")
+    motions = [replace(motion, text=text, beside=(motion.q,)) for motion in played]
+    return player(robot, motions, beside=(other,), signs=[own_title(each.title) for each in (robot, other)])
 
 
 def paths_answer(robot: Robot, results: model.TrajectoryResults) -> Answer:
@@ -141,8 +160,9 @@ def answer_of(
 
 def _sound_row(path: model.PathSummary) -> ListRow:
     """A path that may be run, with how near it comes to anything."""
-    clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), 1.0)
+    least = path.clearance
+    note = tr("{far} mm clear", far=fixed(least.least_mm, 1)) if least else tr("passes")
+    return ListRow("pass", path.name, note, f"#{path.name}", (path.name, least.t_s if least else 0.0), 1.0)
 
 
 def _programs(
@@ -196,34 +216,37 @@ def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
     return bool(program["file"].rpartition(".")[0] == repair_name(path.name))
 
 
-def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> Picture:
+def _figure(path: model.PathSummary, rows: model.PathChecks) -> Picture:
     text = path_text(path)
     alt = tr(
-        "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets. "
-        "{finding}.",
+        "Joint angles and velocities over time for {path}. {finding}.",
         path=path.name,
         finding=text,
     )
-    return path_picture(robot, path, _drawn(path, rows), near, alt, whole_sentence(text))
+    return path_picture(path, _drawn(path, rows), alt, whole_sentence(text))
 
 
-def _nearness(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:
+def _over_time(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:
     """Of a path, and of the motion that repairs it: its name, and over time what fails, or else how near it comes."""
+    checks = _drawn(path, results.checks.take(results.checks.path == path.name))
+    if path.verdict != "safe" and not path.collisions and (path.too_fast or path.singularities):
+        drawn = [(path.name, fault_picture(path.name, path, checks))]
+        if path.chosen:
+            tried = results.avoidance
+            own = _drawn(path, tried.take((tried.path == path.name) & (tried.strategy == path.strategy)))
+            drawn.append((repaired(path), fault_picture(repaired(path), path, own, checks)))
+        return drawn
     rows, shapes = results.clearance.take(results.clearance.path == path.name), results.summary.verdict.shapes
     motion = path.chosen and path.chosen.motion
     shown = [(path.name, "", path.clearance, path), (repaired(path), path.strategy, motion and motion.clearance, None)]
-    drawn = {
-        name: nearness_picture(name, least, rows.take(rows.strategy == strategy), shapes, faulty)
+    return [
+        (name, nearness_picture(name, least, rows.take(rows.strategy == strategy), shapes, faulty))
         for name, strategy, least, faulty in shown
         if least
-    }
-    if path.verdict != "safe" and not path.collisions and (path.too_fast or path.singularities):
-        checks = results.checks.take(results.checks.path == path.name)
-        drawn[path.name] = fault_picture(path, _drawn(path, checks), results.summary.near)
-    return list(drawn.items())
+    ]
 
 
-def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
+def _drawn(path: model.PathSummary, rows: Rows) -> Rows:
     """The rows that a curve needs: evenly spread ones, those at singular poses, and the maximum speeds."""
     even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
     events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
@@ -232,48 +255,11 @@ def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
     return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
-def strategies_shown(path: model.PathSummary) -> list[list[str]]:
-    """Rows of the comparison: the programme, and each strategy."""
-    if not path.avoidance:
-        return []
-    rows = [
-        [
-            tr("as programmed"),
-            "0.00",
-            "0.00",
-            _ratio(path.max_joint_speed_ratio),
-            _ratio(path.max_joint_acceleration_ratio),
-            _clearance(path.clearance),
-            fixed(path.duration_s, 2),
-            tr("the path to be repaired"),
-        ]
-    ]
+def strategies_shown(path: model.PathSummary) -> list[str]:
+    """Each strategy with what it costs, or why it can't be used; that which is chosen has an arrow."""
+    rows = []
     for tried in path.avoidance:
-        name = strategy_word(tried.name) + (" ←" if tried.name == path.strategy else "")
-        if tried.motion is None:
-            rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
-        else:
-            remark = tr("not usable: {reason}", reason=reasons(tried)) if tried.reasons else ""
-            rows.append([name, *_costs(tried.motion), remark])
+        why = tr("Not used: {strategy}: {reason}", strategy=strategy_word(tried.name), reason=reasons(tried))
+        text = why if tried.reasons or tried.motion is None else strategy_text(path, tried)
+        rows.append(text + (" ←" if tried.name == path.strategy else ""))
     return rows
-
-
-def _costs(motion: model.StrategyMotion) -> list[str]:
-    return [
-        fixed(motion.max_deviation_mm, 2),
-        fixed(motion.max_deviation_deg, 2),
-        _ratio(motion.max_joint_speed_ratio),
-        _ratio(motion.max_joint_acceleration_ratio),
-        _clearance(motion.clearance),
-        fixed(motion.duration_s, 2),
-    ]
-
-
-def _clearance(found: model.MinClearance | None) -> str:
-    return bracketed(fixed(found.least_mm, 0), say(found.between)) if found else "–"
-
-
-def _ratio(value: float | None) -> str:
-    if value is None:
-        return tr("no bound")
-    return f"> {FAR:g}" if value > FAR else fixed(value, 2)
