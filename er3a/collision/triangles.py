@@ -438,9 +438,9 @@ def surface_distance(  # noqa: C901, PLR0912
         if not convex and _beyond_plane(points, 3, 0, 3, best):
             continue
         distance = cores_distance(points, (start, other, other, other + count), 0.0, disc, room, close, best)
+        _keep_axis(close, R, axis)  # of triangles that are farther apart too: it mostly keeps their neighbours apart
         if distance < best:
             best = distance
-            _keep_axis(close, R, axis)
             for k in range(2):
                 for r in range(3):
                     near[k, r] = T[r, 0] * close[k, 0] + T[r, 1] * close[k, 1] + T[r, 2] * close[k, 2] + T[r, 3]
