@@ -23,7 +23,7 @@ from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
-from er3a.geometry.transforms import exp_rotation, posed, rot_x, rot_z, rotation_angle, skew_part, translation
+from er3a.geometry.transforms import exp_rotation, log_rotation, posed, rot_x, rot_z, rotation_angle, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
@@ -296,8 +296,7 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     agree = zero.same and directions.same and base.same and flange.same and coupled.same
     agree = agree and units.same and not known.slips and limits.same is not False and speeds.same is not False
     verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
-    alignment = _alignment(plain) if same or not explained else _best_alignment(*in_right_units, plain)
-    off = _distances(printed, in_right_units, alignment, robot_a) if explained else ()
+    alignment, off = _aligned(printed, in_right_units, plain, same) if explained else (_alignment(plain), ())
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = known.slips, units, geometry, zero, directions, base, flange, coupled, limits, speeds
     missing: list[Uncompared] = ["limits"] if limits.same is None else []
@@ -425,15 +424,14 @@ def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
 
 def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
-    angle, axis = mechanism.turn_of(T), np.array([0.0, 0.0, 1.0])
+    turn = log_rotation(T[:3, :3])
+    angle = float(np.linalg.norm(turn))
+    axis = turn / angle if angle > NO_TURN else np.array([0.0, 0.0, 1.0])
     if angle > HALF_TURN:
-        axis = np.linalg.eigh(T[:3, :3] + T[:3, :3].T)[1][:, 2]
         axis *= np.sign(axis[np.abs(axis).argmax()])
-    elif angle > NO_TURN:
-        axis = skew_part(T[:3, :3]) / (2 * math.sin(angle))
     u, v, w = (axis + 0.0).tolist()
-    turn = Turn(math.degrees(angle), (u, v, w))
-    return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), turn, entries)
+    about = Turn(math.degrees(angle), (u, v, w))
+    return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), about, entries)
 
 
 # Joints ---------------------------------------------------------------------------------------------------------------
@@ -516,17 +514,26 @@ def _aligned_flanges(a: Robot, b: Robot, by: Alignment, u: Reals) -> Reals:
     return by.base @ moved @ np.linalg.inv(by.flange)
 
 
-def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> Alignment:
-    """From where the match has them, base, flange and zeros moved until B's flange is nearest to A's at the worst pose.
+def _aligned(
+    as_printed: tuple[Robot, Robot], in_right_units: tuple[Robot, Robot], found: mechanism.Match, same: bool
+) -> tuple[Alignment, tuple[float, ...]]:
+    """What aligns B with A; largest distances (mm), then angles (deg), of the flanges that were found, each as printed
+    and aligned.
 
-    Least sum of a high power of distances, after each round also at the pose found to be the worst by then.
+    Unless both are the ``same`` mechanism, base, flange and zeros are moved from where the match has them until B's
+    flange is nearest to A's at the worst pose: least sum of a high power of distances, after each round also at the
+    pose found to be the worst by then.
     """
-    a, b, start = robot_a.without_tool(), robot_b.without_tool(), _alignment(found)
+    (first, second), (a, b) = ([robot.without_tool() for robot in pair] for pair in (as_printed, in_right_units))
+    start = _alignment(found)
     q = np.random.default_rng(0).uniform(a.lower, a.upper, (ALIGN_POSES, a.joints))
 
     def moved(x: Reals) -> Alignment:
         base, flange = (posed(exp_rotation(own[3:]), own[:3]) for own in (x[:6], x[6:12]))
         return Alignment(base @ start.base, start.flange @ flange, start.zeros + x[12:], start.signs)
+
+    def printed(poses: Reals) -> tuple[Reals, Reals]:
+        return forward(first, poses), forward(second, poses)
 
     def flanges(x: Reals, poses: Reals) -> tuple[Reals, Reals]:
         u = row_values(a, poses)
@@ -539,7 +546,7 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
 
     best = x = np.zeros(12 + a.rows)
     least, worst = worst_pose(shift_between, lambda poses: flanges(best, poses), a)
-    for _ in range(ALIGNED if least > NO_OFFSET else 0):
+    for _ in range(ALIGNED if least > NO_OFFSET and not same else 0):
         q = np.concatenate([q, worst[None]])
         u = row_values(a, q)
         x = scipy.optimize.leastsq(off, x, (u, forward_of_rows(a, u), least), maxfev=ALIGN_TRIES, full_output=True)[0]
@@ -547,25 +554,9 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
         gap, worst = worst_pose(shift_between, lambda poses, now=now: flanges(now, poses), a)  # type: ignore[misc]
         if gap < least:
             best, least = x, gap
-    return moved(best)
-
-
-def _distances(
-    as_printed: tuple[Robot, Robot], in_right_units: tuple[Robot, Robot], alignment: Alignment, ranges: Robot
-) -> tuple[float, ...]:
-    """Largest distances (mm), then angles (deg), of the flanges that were found, each as printed and aligned."""
-    (first, second), (a, b) = ([robot.without_tool() for robot in pair] for pair in (as_printed, in_right_units))
-
-    def printed(q: Reals) -> tuple[Reals, Reals]:
-        return forward(first, q), forward(second, q)
-
-    def aligned(q: Reals) -> tuple[Reals, Reals]:
-        u = row_values(a, q)
-        return forward_of_rows(a, u), _aligned_flanges(a, b, alignment, u)
-
-    mm = [1000 * worst_pose(shift_between, flanges, ranges)[0] for flanges in (printed, aligned)]
-    deg = [math.degrees(worst_pose(turn_between, flanges, ranges)[0]) for flanges in (printed, aligned)]
-    return mm[0], mm[1], deg[0], deg[1]
+    shift = worst_pose(shift_between, printed, a)[0]
+    turns = [worst_pose(turn_between, each, a)[0] for each in (printed, lambda poses: flanges(best, poses))]
+    return moved(best), (1000 * shift, 1000 * least, *map(math.degrees, turns))
 
 
 def shift_between(one: Reals, other: Reals) -> Reals:

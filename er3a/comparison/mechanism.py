@@ -35,7 +35,7 @@ from functools import cached_property
 
 import numpy as np
 
-from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
+from er3a.geometry.transforms import rot_x, rot_y, rot_z, rotation_angle, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
@@ -670,7 +670,7 @@ def is_identity(T: Reals, tolerances: Tolerances) -> bool:
 
 
 def turn_of(T: Reals) -> float:
-    """Angle by which a transform turns, from sine and cosine both.
+    """Angle by which a transform turns.
 
     Parameters
     ----------
@@ -680,9 +680,7 @@ def turn_of(T: Reals) -> float:
     -------
     angle : rad, 0 to pi
     """
-    R = T[:3, :3]
-    skew = math.hypot(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
-    return math.atan2(skew, R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
+    return float(rotation_angle(np.eye(3), T[:3, :3]))
 
 
 def _with_free_turns(
