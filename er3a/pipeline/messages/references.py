@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from er3a.finding import Amount, Finding, is_one
 from er3a.pipeline.language import as_text, own_title, tr, with_unit, words
 from er3a.pipeline.messages.pages import SIDES
-from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.references.subjects import Subject
 
 GROUP_WORDS = words(
@@ -123,7 +121,6 @@ WORDS.update(
         "segment": SEGMENT_WORDS,
     }
 )
-FORMATS["unit"] = partial(with_unit, "")
 
 
 AT_POSE = ("point_at_pose", "orientation_at_pose", "pose_excess")

@@ -17,7 +17,8 @@ there only if each of its fields has a value: not None, and no empty text or lis
 Formats besides those of Python:
 
 - the name of a table of words (:data:`WORDS`): the word for the field's value;
-- one of :data:`FORMATS`: ``own`` for a title out of somebody's file, ``at_least L`` for a bound that stays one;
+- one of :data:`FORMATS`: ``own`` for a title out of somebody's file, ``unit`` for a unit after its number,
+  ``at_least L`` for a bound that stays one;
 - of several values: how many are shown at most, the format of each, and what is between them: ``{bodies:3, }``,
   ``{xyz_mm:.1f, }``, ``{faults:; }``.
 
@@ -35,7 +36,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from functools import singledispatch
+from functools import partial, singledispatch
 from string import Formatter
 from typing import Any
 
@@ -58,6 +59,7 @@ _MARKED = re.compile(r"\{\w+:[?!]\}")
 _SEVERAL = re.compile(r"(\d*)([\w.+]*?)(; |, |\. | or | and | |)")
 FORMATS: dict[str, Callable[[Any], str]] = {
     "own": language.own_title,
+    "unit": partial(language.with_unit, ""),
     "at_least L": lambda litres: at_least(litres, "L"),
     "at_least %": lambda ratio: f"{at_least(100 * ratio, 1)} %",
 }
