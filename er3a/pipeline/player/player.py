@@ -20,7 +20,17 @@ from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at, stand
 from er3a.pipeline.viewing.page import packed_text, page_environment
 from er3a.pipeline.viewing.palette import DOUBTFUL, INK, REFERENCE, SOLUTIONS, TOUCHING
-from er3a.pipeline.viewing.still import AZIMUTH, DISTANCE, ELEVATION, FIELD, WIDE, axes_of, scene_still, triangles_of
+from er3a.pipeline.viewing.still import (
+    AZIMUTH,
+    DISTANCE,
+    ELEVATION,
+    FIELD,
+    WIDE,
+    Still,
+    axes_of,
+    scene_still,
+    triangles_of,
+)
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -79,9 +89,7 @@ def player(
     data["opened"] = opened if opened and opened[0] in named else (shown[0].name, float(shown[0].t[0]))
     first = named[data["opened"][0]]
     robots = (robot, *beside)
-    q = [_at(first, first.q, data["opened"][1]), *first.ghosts]
-    data["turned"] = TURNED if beside else _turned(robot, q, forward(robot, first.q)[:, :3, 3], data)
-    data |= _frame(data, robots, first)
+    still = _still(robots, first, data)
     for own, motion in zip(data["motions"], shown):
         own |= _frame(data, robots, motion)
     return Markup(
@@ -91,10 +99,16 @@ def player(
             looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,
             data=data,
-            still=_still(robots, first, data),
+            still=still.markup(),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
+
+
+def picture_at(robot: Robot, motion: PlayedMotion, t: float, scene: Scene | None) -> bytes:
+    """A WebP picture of an arm and its scene at time ``t`` (s) of a motion, as a player would open."""
+    data = _data(robot, [motion], scene, (), ())
+    return _still((robot,), motion, data | {"opened": (motion.name, t)}).picture()
 
 
 def moment(motion: str, t: float, text: str) -> Markup:
@@ -216,9 +230,13 @@ def _at(motion: PlayedMotion, q: Reals, t: float) -> Reals:
     return np.array([np.interp(t, motion.t, own) for own in q.T])
 
 
-def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Markup:
-    """The picture at that moment, which the page shows without WebGL."""
+def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Still:
+    """The picture at the moment that the player opens at, which the page shows without WebGL; where the eye is then
+    is added to the data."""
     t = data["opened"][1]
+    drawn, way = [_at(motion, motion.q, t), *motion.ghosts], forward(robots[0], motion.q)[:, :3, 3]
+    data["turned"] = TURNED if len(robots) > 1 else _turned(robots[0], drawn, way, data)
+    data |= _frame(data, robots, motion)
     now = [event for event in motion.events if event.t <= t <= event.until]
     colours = {name: COLOURS.get(event.status, TOUCHING) for event in now for name in event.bodies}
     values = (motion.q, *motion.beside)
@@ -237,7 +255,7 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
     for shape in data["scene"]:
         if "pale" not in shape:
             picture.word(shape["name"], np.array(shape["T"])[:3, 3], "fail" if shape["name"] in colours else "ink")
-    return picture.markup()
+    return picture
 
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:
