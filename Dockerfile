@@ -1,9 +1,9 @@
-# er3a with its locked, hash-checked packages, and a software graphics driver for previews of recordings.
+# er3a with its locked, hash-checked packages.
 #   docker build -t er3a .
 #   docker run --rm -v "$PWD:/study" er3a run --study config/small.yaml -- --cores 2
 FROM docker.io/library/debian:bookworm-slim
 RUN apt-get update \
-    && apt-get install --yes --no-install-recommends libvulkan1 mesa-vulkan-drivers python3-venv \
+    && apt-get install --yes --no-install-recommends python3-venv \
     && rm -rf /var/lib/apt/lists/* \
     && useradd --create-home --uid 1000 er3a \
     && install --directory --owner er3a /study

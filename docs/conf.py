@@ -134,12 +134,12 @@ def write_gallery(app: Sphinx) -> None:
 
 
 def _linked(page: Path) -> str:
-    """The link to a page of the gallery, with its preview; nothing if there is no such page."""
+    """The link to a page of the gallery, with its picture; nothing if there is no such page."""
     if not page.is_file():
         return ""
-    preview, shown = page.with_suffix(".webp"), page.stem
-    if preview.is_file() and preview.stat().st_size:
-        shown = f'<img src="../gallery/{page.parent.name}/{preview.name}" width="150" alt=""><br>{page.stem}'
+    picture, shown = page.with_suffix(".webp"), page.stem
+    if picture.is_file():
+        shown = f'<img src="../gallery/{page.parent.name}/{picture.name}" width="150" alt=""><br>{page.stem}'
     return f'<a href="../gallery/{page.parent.name}/{page.name}">{shown}</a>'
 
 

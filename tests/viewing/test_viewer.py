@@ -95,11 +95,12 @@ def listened_to(process: psutil.Process) -> list:
 
 @pytest.mark.long
 def test_it_listens_on_the_loopback_address_alone(recording):
-    port = free_port()
-    with viewer_running([recording], "--headless", "--port", str(port)) as viewer:
+    port, page = free_port(), free_port()
+    words = ("--serve-web", "--port", str(port), "--web-viewer-port", str(page))
+    with viewer_running([recording], *words) as viewer:
         deadline = time.monotonic() + 60
         listening: list = []
-        while port not in [address.port for address in listening]:
+        while not {port, page} <= {address.port for address in listening}:
             assert time.monotonic() < deadline
             assert viewer.poll() is None, "the viewer ended early"
             time.sleep(0.1)

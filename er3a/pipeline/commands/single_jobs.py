@@ -62,10 +62,7 @@ def views(
     results: options.Results = options.DEFAULT_RESULTS,
     reports: options.Reports = options.DEFAULT_REPORTS,
 ):
-    """Write a robot's recordings (always in English) and pages from results.
-
-    The viewer also draws each recording as a picture for its page.
-    """
+    """Write a robot's recordings (always in English), a picture of each, and pages from results."""
     from er3a.pipeline.stages import run
     from er3a.pipeline.viewing.figures import house_style
 
@@ -74,9 +71,12 @@ def views(
     named = [_known(page, (*STAGES, TEACH)) for page in pages or loaded.pages(robot)]
     stages = [STAGES[page] for page in named if page != TEACH]
     with language.using("en"):
-        recorded = [stage.name for stage in stages if "record" in stage.views]
-        if problem := _record(loaded, robot, recorded, results, reports):
-            options.print_note(f"previews of recordings were skipped: {problem}")
+        for stage in stages:
+            if "record" in stage.views:
+                recording = reports / robot / f"{stage.name}.rrd"
+                run.show("record", stage.name, loaded, robot, results / robot / stage.name, recording)
+                write_checksum(recording)
+                write_checksum(recording.with_suffix(".webp"))
     with house_style():
         for stage in stages:
             page = reports / robot / f"{stage.name}.html"
@@ -84,23 +84,6 @@ def views(
             write_checksum(page)
     if TEACH in named:
         _write_teach_page(loaded, robot, results, reports)
-
-
-def _record(study: Study, robot: str, stages: list[str], results: Path, reports: Path) -> str:
-    """Write recordings of stages and their pictures; why there is no picture, if there is to be one."""
-    from er3a.pipeline.stages import run
-    from er3a.pipeline.viewing.viewer import draw_previews
-
-    wanted = []
-    for stage in stages:
-        recording = reports / robot / f"{stage}.rrd"
-        moment = run.show("record", stage, study, robot, results / robot / stage, recording)
-        wanted.append((recording, recording.with_suffix(".webp"), moment))
-    problem = draw_previews(wanted)
-    for recording, picture, _ in wanted:
-        write_checksum(recording)
-        write_checksum(picture)
-    return problem
 
 
 def _write_teach_page(study: Study, robot: str, results: Path, reports: Path) -> None:

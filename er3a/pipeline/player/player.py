@@ -20,7 +20,17 @@ from er3a.pipeline.player.motions import PlayedMotion, Weight
 from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at, stand
 from er3a.pipeline.viewing.page import packed_text, page_environment
 from er3a.pipeline.viewing.palette import DOUBTFUL, INK, REFERENCE, SOLUTIONS, TOUCHING
-from er3a.pipeline.viewing.still import AZIMUTH, DISTANCE, ELEVATION, FIELD, WIDE, axes_of, scene_still, triangles_of
+from er3a.pipeline.viewing.still import (
+    AZIMUTH,
+    DISTANCE,
+    ELEVATION,
+    FIELD,
+    WIDE,
+    Still,
+    axes_of,
+    scene_still,
+    triangles_of,
+)
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -85,9 +95,7 @@ def player(
     for own, motion in zip(data["motions"], shown):
         if motion.events and not beside:  # what nothing is said of is the one before it in another way, and seen alike
             gravest = min(reversed(motion.events), key=lambda event: GRAVEST.index(event.status))
-            seen = data["opened"][1] if motion is first else gravest.t
-            q = [_at(motion, motion.q, seen), *motion.ghosts]
-            turned = _turned(robot, q, forward(robot, motion.q)[:, :3, 3], data)
+            turned = _turned(robot, motion, data["opened"][1] if motion is first else gravest.t, data)
         own |= _frame(data, robots, motion, turned) | {"turned": turned}
     data |= {key: own[key] for own in data["motions"] if own["name"] == first.name for key in VIEW}
     return Markup(
@@ -97,10 +105,18 @@ def player(
             looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,
             data=data,
-            still=_still(robots, first, data),
+            still=_still(robots, first, data).markup(),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
+
+
+def picture_at(robot: Robot, motion: PlayedMotion, t: float, scene: Scene | None) -> bytes:
+    """A WebP picture of an arm and its scene at time ``t`` (s) of a motion, as a player would open."""
+    data = _data(robot, [motion], scene, (), ()) | {"opened": (motion.name, t)}
+    turned = _turned(robot, motion, t, data)
+    data |= _frame(data, (robot,), motion, turned) | {"turned": turned}
+    return _still((robot,), motion, data).picture()
 
 
 def moment(motion: str, t: float, text: str) -> Markup:
@@ -185,15 +201,10 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, 
     return {"length": float(length), "target": (middle @ axes).tolist()}
 
 
-def _turned(robot: Robot, q: Sequence[Reals], way: Reals, data: dict[str, Any]) -> float:
-    """By how much (rad) the eye is turned to see the arm and its way from the side, walls along them, and no body
-    before it.
-
-    Parameters
-    ----------
-    q : (n,) each, rad or m, of the poses that are drawn
-    way : (N, 3), m, of the tool
-    """
+def _turned(robot: Robot, motion: PlayedMotion, t: float, data: dict[str, Any]) -> float:
+    """By how much (rad) the eye is turned to see the arm at a time (s), and its way, from the side, walls along them,
+    and no body before it."""
+    q, way = [_at(motion, motion.q, t), *motion.ghosts], forward(robot, motion.q)[:, :3, 3]
     joints = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
     bodies = [(_corners(shape), shape.get("large")) for shape in data["scene"] if "pale" not in shape]
     points = np.concatenate([joints, (joints[:, 1:] + joints[:, :-1]) / 2], axis=1)
@@ -222,8 +233,8 @@ def _at(motion: PlayedMotion, q: Reals, t: float) -> Reals:
     return np.array([np.interp(t, motion.t, own) for own in q.T])
 
 
-def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Markup:
-    """The picture at that moment, which the page shows without WebGL."""
+def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Still:
+    """The picture at the moment that the player opens at, which the page shows without WebGL."""
     t = data["opened"][1]
     now = [event for event in motion.events if event.t <= t <= event.until]
     colours = {name: COLOURS.get(event.status, TOUCHING) for event in now for name in event.bodies}
@@ -243,7 +254,7 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
     for shape in data["scene"]:
         if "pale" not in shape:
             picture.word(shape["name"], np.array(shape["T"])[:3, 3], "fail" if shape["name"] in colours else "ink")
-    return picture.markup()
+    return picture
 
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:

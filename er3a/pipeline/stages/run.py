@@ -43,7 +43,7 @@ class Compute(Protocol):
 class View(Protocol):
     """What a stage's ``record.record`` and ``report.report`` are: they write a view of stored results."""
 
-    def __call__(self, study: Study, stored: Stored[Any], output: Path, /) -> float | None: ...
+    def __call__(self, study: Study, stored: Stored[Any], output: Path, /) -> None: ...
 
 
 def compute(name: str, study: Study, robot: str, folder: Path) -> str | None:
@@ -101,7 +101,7 @@ def _computed(stage: Stage, study: Study, robot: str) -> Results:
     return AbsentResults(Summary(Verdict("not_computed", fact("stage.not_computed", reason=reason)), ()))
 
 
-def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: Path) -> float | None:
+def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: Path) -> None:
     """Write a page or recording of a stage's results.
 
     Parameters
@@ -109,10 +109,6 @@ def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: P
     verb : ``record`` or ``report``
     folder : of the stage's results
     output : file, written whole or not at all
-
-    Returns
-    -------
-    look_s : of a recording when its first fault is on, s on its timeline; None where there is none
 
     Raises
     ------
@@ -130,4 +126,4 @@ def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: P
         view: View = absent
     else:
         view = getattr(stage.module(f"page.{verb}"), verb)
-    return view(study, stored, output)
+    view(study, stored, output)

@@ -33,7 +33,7 @@ class Stage:
     extra_inputs : what else of the study they rest on besides settings, as plain data by name
     is_configured : whether the study gives a robot what the stage reads; without that it does not run
     applies : why the stage can't be computed for a robot, a finding of one of ``absences``; None if it can
-    views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
+    views : ``record`` (a recording, with its picture) and ``report`` (a page), as far as the stage has them
     rests_on : names of the stages whose verdict its pages say first
     shows : names of the stages whose results its page shows besides its own, as far as they are there
     obstacles : whether it looks for collisions; its page then says that the workspace's tray is no obstacle

@@ -347,7 +347,7 @@ def render(
             head=head,
             command=command,
             provenance=head.provenance if head else provenance,
-            preview=_preview(output.with_suffix(".webp")),
+            preview=None if context.get("player") else _preview(output.with_suffix(".webp")),
             versions=_versions(),
             commit=_commit(),
             **context,
@@ -563,9 +563,10 @@ def packed_text(text: str) -> str:
 
 
 def _preview(picture: Path) -> str | None:
-    """The preview of a recording as a data address; None where there is none or none could be drawn."""
-    content = picture.read_bytes() if picture.is_file() else b""
-    return "data:image/webp;base64," + base64.b64encode(content).decode("ascii") if content else None
+    """The picture of a recording as a data address; None where there is none."""
+    if not picture.is_file():
+        return None
+    return "data:image/webp;base64," + base64.b64encode(picture.read_bytes()).decode("ascii")
 
 
 def _versions() -> dict[str, str]:

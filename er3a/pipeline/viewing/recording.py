@@ -22,7 +22,8 @@ from er3a.files.kept_files import write_atomically
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.say import say, say_all
-from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight, at_rest
+from er3a.pipeline.player.player import picture_at
 from er3a.pipeline.results import AbsentResults, Stored
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import (
@@ -168,8 +169,8 @@ class Recorded:
     verdict: str = ""
 
 
-def write_recording(shown: Recorded, output: Path) -> float | None:
-    """Write a recording of a stage; it opens at the start of the first run.
+def write_recording(shown: Recorded, output: Path) -> None:
+    """Write a recording of a stage, which opens at the start of the first run, and its picture beside it.
 
     The joint values have a panel of their own in every recording; the events make a lane of states.
 
@@ -177,10 +178,6 @@ def write_recording(shown: Recorded, output: Path) -> float | None:
     ----------
     shown : the arm, its runs one after another, and curves
     output : the recording, written whole or not at all
-
-    Returns
-    -------
-    look_s : when the gravest event begins, s on the recording's timeline; None where there is none
 
     Raises
     ------
@@ -213,19 +210,32 @@ def write_recording(shown: Recorded, output: Path) -> float | None:
         before: set[str] = set()
         for run, start in zip(shown.runs, starts):
             before = _log_run(stream, shown, run, start, before)
-    return _moment_to_show(shown, starts)
+    draw_picture(shown, output)
 
 
-def _moment_to_show(shown: Recorded, starts: Sequence[float]) -> float | None:
-    """When the gravest event begins, s on the timeline: a collision before others, rather with what is around the arm
-    than with itself; None where there is none."""
+def draw_picture(shown: Recorded, output: Path) -> None:
+    """Write the arm and its scene as a WebP picture, when the gravest event begins: a collision before others, rather
+    with what is around the arm than with itself; without events at the start of the first run that moves the arm.
+
+    Parameters
+    ----------
+    output : the recording; the picture has its name and ``.webp``
+    """
     around = {solid.name for solid in shown.scene.solids} if shown.scene else set()
-    moments = [
-        (WEIGHTS.index(each.status), bool(around.intersection(each.bodies)), bool(each.bodies), start + each.t)
-        for run, start in zip(shown.runs, starts)
-        for each in run.events
-    ]
-    return max(moments, key=itemgetter(0, 1, 2), default=(0, False, False, None))[3]
+    known = [(run, np.isfinite(run.q).all(axis=1)) for run in shown.runs]
+    moving: list[PlayedMotion] = [replace(run, t=run.t[rows], q=run.q[rows]) for run, rows in known if rows.any()]
+    moving = moving or [at_rest(shown.robot, "", q=shown.home)]
+    _, motion, t = max(
+        (
+            ((WEIGHTS.index(each.status), bool(around.intersection(each.bodies)), bool(each.bodies)), motion, each.t)
+            for motion in moving
+            for each in motion.events
+        ),
+        key=itemgetter(0),
+        default=(None, moving[0], 0.0),
+    )
+    picture = picture_at(shown.robot, motion, t, shown.scene)
+    write_atomically(output.with_suffix(".webp"), lambda file: file.write_bytes(picture))
 
 
 def _log_styles(stream: rr.RecordingStream, shown: Recorded, curves: Curves) -> None:
@@ -358,22 +368,18 @@ def escaped(text: str) -> str:
     return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))
 
 
-def record_stage(study: Study, stored: Stored[Any], output: Path, note: str, **shown: Any) -> float | None:
+def record_stage(study: Study, stored: Stored[Any], output: Path, note: str, **shown: Any) -> None:
     """Write the recording of a stage.
 
     Parameters
     ----------
     note : with places for the robot's ``title`` and the verdict's ``findings``
     shown : what else :class:`Recorded` holds
-
-    Returns
-    -------
-    look_s : when the gravest event begins, s on the recording's timeline; None where there is none
     """
     robot, findings = study.robot(stored.robot), say_all(stored.results.summary.verdict.findings)
     text = note.format(title=escaped(robot.title), findings=escaped(findings))
     shown = {"robot": robot, "verdict": stored.results.summary.verdict.status} | shown
-    return write_recording(Recorded(name=stored.robot, stage=stored.stage, note=text, **shown), output)
+    write_recording(Recorded(name=stored.robot, stage=stored.stage, note=text, **shown), output)
 
 
 def _end(run: Run) -> float:
@@ -583,7 +589,7 @@ def _touching(shown: Recorded, events: Sequence[PlayedEvent]) -> Iterator[tuple[
 
 
 def record_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
-    """Write the recording of a stage that was not computed, which holds the reason alone.
+    """Write the recording of a stage that was not computed, which holds the reason alone; its picture shows the arm.
 
     Parameters
     ----------
@@ -592,3 +598,4 @@ def record_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> 
     """
     with recording(output, stored.robot, stored.stage, _note_view(stored.stage)) as stream:
         _log_text(stream, f"{stored.stage}/note", escaped(say(stored.results.summary.verdict.finding)))
+    draw_picture(Recorded(study.robot(stored.robot), stored.robot, stored.stage, ""), output)

@@ -149,14 +149,18 @@ class Still:
                 self.words.append(Markup('<text x="{:.1f}" y="{:.1f}" style="{}">{}</text>').format(u, v, look, text))
                 return
 
-    def markup(self) -> Markup:
-        """The picture with its words as HTML: what the script of a page writes its own words over."""
-        parts = self.bodies[0] + SHADOW * (1 - self.bodies[0][..., 3:]) * self.shadow[0]
-        parts = parts.reshape(HEIGHT, FINE, WIDTH, FINE, 4).mean(axis=(1, 3))
+    def picture(self) -> bytes:
+        """The picture without its words, as a WebP file."""
+        whole = self.bodies[0] + SHADOW * (1 - self.bodies[0][..., 3:]) * self.shadow[0]
+        parts: Reals = np.sum([whole[i::FINE, j::FINE] for i in range(FINE) for j in range(FINE)], axis=0) / FINE**2
         parts[..., :3] /= np.maximum(parts[..., 3:], 1e-6)
         file = io.BytesIO()
         Image.fromarray(np.round(255 * np.clip(parts, 0, 1)).astype(np.uint8)).save(file, "webp", quality=QUALITY)
-        source = "data:image/webp;base64," + base64.b64encode(file.getvalue()).decode("ascii")
+        return file.getvalue()
+
+    def markup(self) -> Markup:
+        """The picture with its words as HTML: what the script of a page writes its own words over."""
+        source = "data:image/webp;base64," + base64.b64encode(self.picture()).decode("ascii")
         words = Markup("").join(self.words)
         picture = Markup('<img class="still" alt="" src="{}">').format(source)
         over = '<svg class="words" viewBox="0 0 {} {}" aria-hidden="true">{}</svg><p class="flat">{}</p>'

@@ -1,7 +1,6 @@
 """Starts the Rerun viewer on the loopback address only and without usage statistics.
 
-Shows recordings in a browser on this machine if there is no desktop, and draws the preview of a recording, also without
-a display.
+Shows recordings in a browser on this machine if there is no desktop.
 
 With Rerun's own web server the viewer in the browser would send usage statistics, ask for updates and fetch fonts, and
 recordings would lose their blueprints. So the viewer's files are taken from it once and served from here, together with
@@ -10,7 +9,6 @@ the recordings, under a policy that lets the browser connect to no other address
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import re
@@ -21,19 +19,14 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, TypeVar
 from urllib.parse import urlencode
 
-from PIL import Image
-
 from er3a.errors import Er3aError
-from er3a.files.kept_files import write_atomically
 
 LOOPBACK = "127.0.0.1"
 LONGEST_S = 120
@@ -72,24 +65,18 @@ def free_port() -> int:
 
 
 @contextmanager
-def viewer_running(
-    recordings: Sequence[Path], *words: str, messages: Path | None = None
-) -> Iterator[subprocess.Popen[bytes]]:
+def viewer_running(recordings: Sequence[Path], *words: str) -> Iterator[subprocess.Popen[bytes]]:
     """A viewer in the background, without statistics; ended with all its processes.
 
     Should this process be killed, the viewer ends after LONGEST_S where the system has the command `timeout`.
-
-    Parameters
-    ----------
-    messages : file for its errors
     """
     limited = ["timeout", str(LONGEST_S)] if shutil.which("timeout") else []
-    with without_statistics() as environment, (messages or Path(os.devnull)).open("wb") as stderr:
+    with without_statistics() as environment:
         viewer = subprocess.Popen(
             [*limited, *viewer_command(recordings, *words)],
-            env=environment | {"RUST_LOG": "error", "RUST_BACKTRACE": "0"},  # warnings would be shown in the picture
+            env=environment,
             stdout=subprocess.DEVNULL,
-            stderr=stderr,
+            stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
         try:
@@ -231,121 +218,3 @@ def _fetched(url: str) -> tuple[str, bytes]:
         kind, content = answer.headers["Content-Type"], answer.read()
     # No policy keeps a browser from connecting ahead of a font that it may not load then.
     return kind, re.sub(rb"<link\b[^>]*https://[^>]*>", b"", content) if kind.startswith("text/html") else content
-
-
-WINDOW = "1200x780"  # pixels
-TITLE_BAR = 36
-TIME_BAR = 34  # left out: it fills as loading goes
-QUALITY = 75
-PATIENCE_S = 60
-Answer = TypeVar("Answer")
-
-
-def draw_previews(wanted: Sequence[tuple[Path, Path, float | None]]) -> str:
-    """Draw recordings as WebP pictures, in one viewer: starting it takes longer than a picture.
-
-    Parameters
-    ----------
-    wanted : recording, picture to write, and the moment that it shows, s on the recording's timeline; None for how it
-        opens
-
-    Returns
-    -------
-    why one could not be drawn, empty if all were; what could not be drawn becomes an empty file
-    """
-    reason = ""
-    while wanted:
-        pictures, problem = _pictures(wanted)
-        reason = problem or reason
-        done = [*pictures, b""] if problem else pictures
-        for (_, output, _), picture in zip(wanted, done):
-            write_atomically(output, partial(Path.write_bytes, data=picture))
-        wanted = wanted[len(done) :]
-    return reason
-
-
-def _pictures(wanted: Sequence[tuple[Path, Path, float | None]]) -> tuple[list[bytes], str]:
-    """As many of the pictures, in their order, as one viewer draws; and why it does not draw the next one, if so."""
-    from rerun.experimental import ViewerClient  # takes long to import, and `er3a view` needs none
-
-    drawn: list[bytes] = []
-    with TemporaryDirectory(prefix="er3a-preview-") as folder:
-        messages, port = Path(folder) / "messages", free_port()
-        words = ("--headless", "--port", str(port), "--window-size", WINDOW, "--hide-welcome-screen")
-        with viewer_running([wanted[0][0].resolve()], *words, messages=messages) as viewer:
-            try:
-                client = _answered(viewer, lambda: ViewerClient(f"rerun+http://{LOOPBACK}:{port}/proxy"))
-                for recording, _, moment in wanted:
-                    image = Image.open(io.BytesIO(_shoot(client, viewer, recording, moment))).convert("RGB")
-                    encoded = io.BytesIO()
-                    image.crop((0, TITLE_BAR, image.width, image.height - TIME_BAR)).save(
-                        encoded, "WEBP", quality=QUALITY
-                    )
-                    drawn.append(encoded.getvalue())
-            except EOFError:
-                return drawn, _why(messages.read_text(encoding="utf-8", errors="replace"))
-            except Er3aError as error:
-                return drawn, str(error)
-    return drawn, ""
-
-
-def _shoot(client: Any, viewer: subprocess.Popen[bytes], recording: Path, moment: float | None) -> bytes:
-    """A recording's picture: drawn again until one is like the one before, as everything is loaded then."""
-    opened = _answered(viewer, lambda: client.open(str(recording.resolve()))).store_ids
-    before = b""
-
-    def shown() -> bool:
-        state = client.get_state()
-        if state.active_recording not in opened or state.loading:
-            return False
-        client.run_command("ui.toggle_blueprint_panel")  # its tree unfolds or not, as loading goes
-        if moment is not None:
-            client.set_time(duration=moment)
-        return True
-
-    def steady() -> bytes:
-        nonlocal before
-        picture, last = client.take_screenshot(), before
-        before = picture
-        return picture if picture == last else b""
-
-    _answered(viewer, shown)
-    return _answered(viewer, steady)
-
-
-def _answered(viewer: subprocess.Popen[bytes], ask: Callable[[], Answer]) -> Answer:
-    """What the viewer answers as soon as it has something to say.
-
-    Raises
-    ------
-    EOFError
-        if the viewer ends
-    Er3aError
-        if that takes longer than PATIENCE_S
-    """
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
-        if viewer.poll() is not None:
-            raise EOFError
-        with suppress(ConnectionError, RuntimeError):
-            if answer := ask():
-                return answer
-        time.sleep(0.05)
-    raise Er3aError(f"the viewer drew no steady picture in {PATIENCE_S} s")
-
-
-AN_ERROR = re.compile(
-    r"\b(error|fail(ed|s|ure)?|can't|cannot|can not|could not|couldn't|unable|missing|not found|no such|denied|refused|"
-    r"requires?|unsupported|not supported|incompatible|invalid|no suitable|no adapter)\b",
-    re.IGNORECASE,
-)
-OF_CODE = re.compile(r"\w::\w|\w \{|\}|^[|=^~ ]*$")
-"""Names and values of a program's own, which tell a user nothing."""
-
-
-def _why(messages: str) -> str:
-    """That the viewer ended, and its last words if they tell of an error."""
-    panic = re.search(r"panicked at '(.+?)'\n", messages, flags=re.DOTALL)
-    last = panic[1] if panic else (messages.strip().splitlines() or [""])[-1].strip()
-    said = f": {last}" if AN_ERROR.search(last) and not OF_CODE.search(last) else ""
-    return f"the Rerun viewer ended without a picture{said} (docs/recordings.md tells what it needs)"

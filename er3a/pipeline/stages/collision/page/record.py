@@ -33,11 +33,11 @@ curve shows how far they are apart. Below 0 they overlap.
 """
 
 
-def record(study: Study, stored: Stored[CollisionResults], output: Path) -> float | None:
+def record(study: Study, stored: Stored[CollisionResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     name, results = stored.robot, stored.results
     robot = study.robot(name)
-    return record_stage(
+    record_stage(
         study,
         stored,
         output,

@@ -32,7 +32,7 @@ slide to one of their own)
 """
 
 
-def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> float | None:
+def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
     """Write the dynamics recording of a robot."""
     results, robot = stored.results, study.robot(stored.robot)
     titles = {path.name: path.title for path in results.summary.paths}
@@ -41,7 +41,7 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> float
     peaks = np.abs(np.concatenate([results.torques.torque, np.zeros((1, robot.joints))])).max(axis=0)
     turning, sliding = (peaks[robot.slides == slides].max(initial=1e-12) for slides in (False, True))
     scale = LONGEST * size_of(robot) / np.where(robot.slides, sliding, turning)
-    return record_stage(
+    record_stage(
         study,
         stored,
         output,

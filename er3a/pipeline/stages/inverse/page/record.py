@@ -37,11 +37,11 @@ tree on the left. A flip and a no-flip branch lie on one another.
 """
 
 
-def record(study: Study, stored: Stored[InverseResults], output: Path) -> float | None:
+def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     name, solutions = stored.robot, stored.results.solutions
     robot, targets = study.robot(name), shown_targets(stored.results.summary.targets)
-    return record_stage(
+    record_stage(
         study,
         stored,
         output,

@@ -36,11 +36,11 @@ the text beside it shows the line that it is at.
 """
 
 
-def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> float | None:
+def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     """Write the recording of a robot's programs."""
     results = stored.results
     played = {motion.name: motion for motion in motions(study.robot(stored.robot), results)}
-    return record_stage(
+    record_stage(
         study,
         stored,
         output,

@@ -47,10 +47,10 @@ Press play: it runs along one path after another.
 """
 
 
-def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> float | None:
+def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
     """Write the trajectory recording of a robot."""
     robot, results = study.robot(stored.robot), stored.results
-    return record_stage(
+    record_stage(
         study,
         stored,
         output,

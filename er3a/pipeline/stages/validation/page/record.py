@@ -36,7 +36,7 @@ POSES = """
 """
 
 
-def record(study: Study, stored: Stored[ValidationResults], output: Path) -> float | None:
+def record(study: Study, stored: Stored[ValidationResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     results, robot = stored.results, model_of(study, stored.robot)
     axes, poses = results.axes, results.key_poses
@@ -45,7 +45,7 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> flo
     parts = [HEAD, LOOK if len(poses) else "", FINDINGS, POSES if len(poses) else ""]
     parts.append(f"- see-through arm: the same table, {fault}\n" if corrected is not None else "")
     runs = [_run(robot, rows, following, results.checks) for rows, following in pairwise([*stations, None]) if rows]
-    return record_stage(
+    record_stage(
         study,
         stored,
         output,

@@ -41,7 +41,7 @@ Press play: the arm goes through the samples, then to each object that it can gr
 """
 
 
-def record(study: Study, stored: Stored[VisionResults], output: Path) -> float | None:
+def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     results, summary, robot = stored.results, stored.results.summary, study.robot(stored.robot)
     size = size_of(robot)
@@ -53,7 +53,7 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> float |
     for each in summary.objects:
         shapes |= _object(each, size)
     fixed = found is not None and found.setup == "eye_to_hand"
-    return record_stage(
+    record_stage(
         study,
         stored,
         output,

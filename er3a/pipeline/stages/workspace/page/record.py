@@ -32,10 +32,10 @@ NOTE = """# Workspace of {title}
   `/workspace/cloud/near` is the rest"""
 
 
-def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> float | None:
+def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
     """Write the workspace recording of a robot from its results."""
     results = stored.results
-    return record_stage(
+    record_stage(
         study,
         stored,
         output,
