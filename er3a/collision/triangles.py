@@ -438,7 +438,7 @@ def surface_distance(  # noqa: C901, PLR0912
         if not convex and _beyond_plane(points, 3, 0, 3, best):
             continue
         distance = cores_distance(points, (start, other, other, other + count), 0.0, disc, room, close, best)
-        _keep_axis(close, R, axis)  # of triangles that are farther apart too: it mostly keeps their neighbours apart
+        _keep_axis(close, R, axis)  # of any two triangles: it mostly separates their neighbours, too
         if distance < best:
             best = distance
             for k in range(2):

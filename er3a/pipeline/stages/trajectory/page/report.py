@@ -50,7 +50,7 @@ from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
 Rows = TypeVar("Rows", bound=model.MotionRows)
-APART = 0.6  # of an arm's size, between two
+DISTANCE = 0.6  # of an arm's size, between two
 DRAWN = 250  # points of a curve
 MAX_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
 
@@ -101,7 +101,7 @@ def _both_arms(study: Study, stored: Stored[model.TrajectoryResults], played: Se
     other = study.robot(instead) if instead else robot
     if other is robot or other.joints != robot.joints:
         return player(robot, played)
-    other = other.replace(base=translation(0.0, -APART * size_of(robot), 0.0) @ other.base)
+    other = other.replace(base=translation(0.0, -DISTANCE * size_of(robot), 0.0) @ other.base)
     text = tr("The same joint angles, another pose.")
     motions = [replace(motion, text=text, beside=(motion.q,)) for motion in played]
     return player(robot, motions, beside=(other,), signs=[own_title(each.title) for each in (robot, other)])
