@@ -43,8 +43,8 @@ from er3a.pipeline.verdicts import write_junit_error
 def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path, ResultError]]:
     """Files that are there and not as they were written, or of another format version, each with what is wrong.
 
-    These are results, pages, recordings and their pictures. Of a stage's results it is the summary that is named, without
-    which the stage counts as not done.
+    These are results, pages, recordings and their pictures. Of a stage's results it is the summary that is named,
+    without which the stage counts as not done.
     """
     checks: list[tuple[Path, Callable[[Path], object]]] = [
         (reports / page, check_checksum) for page in (*OVERALL, *study.article_pages().values())
