@@ -476,7 +476,7 @@ def test_page_and_recording_say_what_was_found(full, tmp_path):
     study, found = full
     report(study, found, tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    for heading in ("Against the limits", "Motor requirements", "Wrist load", "At rest"):
+    for heading in ("Against the limits", "Motor requirements", "At rest"):
         assert heading in page
     body = re.sub(r"<(script|style).*?</\1>|data:[^\"']*", "", page, flags=re.DOTALL)
     assert not re.search(r"\b(nan|NaN|inf|None)\b", body)
@@ -579,7 +579,7 @@ def test_forces_of_joints_that_slide_are_not_called_torques_in_newton_metres(ful
     mixed = replace(summary, holding=tuple(slid), paths=tuple(paths), motors=tuple(motors))
     report(study, replace(found, results=replace(found.results, summary=mixed)), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    for text in ("peak (N m or N)", "speed (°/s or mm/s)", "load inertia (kg m² or kg)", "J3 (slides)"):
+    for text in ("peak (N m or N)", "speed (°/s or mm/s)", "J3 (slides)"):
         assert text in page
     report(study, found, tmp_path / "plain.html")
     assert "N m or N" not in (tmp_path / "plain.html").read_text(encoding="utf-8")

@@ -210,13 +210,13 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     (entry,) = (each for each in load_paths(f"data/paths/{robot}.yaml").paths if each.name == name)
     start, end = np.array(entry.start.xyz_mm), np.array(entry.end.xyz_mm)
     left, at, stops = re.search(
-        r": ([\d.]+) s before the first fault\. It is at \((.*?)\) mm then; a stop takes (.*?) s", said
+        r", ([\d.]+) s before faults\. It is at \((.*?)\) mm then; a stop takes ([\d.]+) s", said
     ).groups()
     named = np.array([float(x) for x in at.split(", ")])
     part = float(np.linalg.norm(named - start) / np.linalg.norm(end - start))
     there = {"xyz_mm": named.tolist(), "rpy_deg": list(entry.end.rpy_deg)}
     shorter, *_ = paths_of(tmp_path, name, robot=robot, end=there, duration_s=path.duration_s * part)
-    assert f"{left} s before the first fault. It is at ({at}) mm" in fault.to_do
+    assert f"{left} s before faults. It is at ({at}) mm" in fault.to_do
     assert named == pytest.approx(start + part * (end - start), abs=0.06)
     assert shorter.verdict == "safe"
     assert shorter.clearance is None or shorter.clearance.least_mm >= 20
@@ -242,7 +242,7 @@ def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_pa
     (path,), (fault,) = results.summary.paths, faults(results)
     assert path.collisions[0].t0_s < path.out_of_limits[0].t0_s
     assert path.outcomes == ("collides", "leaves limits")
-    assert fault.verdict == "collides, leaves limits"
+    assert fault.verdict == "hits itself, leaves limits"
     assert "Expected to fail, and did: line_limits (collides, leaves limits)" in say(results.summary.verdict.finding)
     assert fault.meant
     alone = replace(path, expect=("leaves limits",))  # of a file that does not expect the collision
@@ -512,7 +512,7 @@ def test_where_a_repair_is_slower_is_told_with_the_least_share_of_the_speed(tmp_
     inside = (at > found.start_s) & (at < found.end_s)
     assert share[inside].min() == pytest.approx(found.part, abs=0.02)
     (fault,) = faults(results)
-    said = f"Slow to {int(100 * found.part)} % from t = {found.start_s:.2f} to {found.end_s:.2f} s"
+    said = f"Slow to {int(100 * found.part)} % from {found.start_s:.2f} to {found.end_s:.2f} s"
     assert fault.to_do.startswith(said)
     assert "Or run all of it at" in fault.to_do
     assert slowed(replace(path, strategy="branch"), rows, repair) is None

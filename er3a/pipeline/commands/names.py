@@ -90,7 +90,11 @@ COMMANDS = {
     ),
     "program": ("programs", PROGRAMS, "Write robot programs from paths."),
     "compute": ("single_jobs", JOBS, "Compute a stage: tables and summary.json."),
-    "views": ("single_jobs", JOBS, "Write a robot's recordings (always in English) and pages from results."),
+    "views": (
+        "single_jobs",
+        JOBS,
+        "Write a robot's recordings (always in English), a picture of each, and pages from results.",
+    ),
     "index": ("single_jobs", JOBS, "Write the index."),
     "article": (
         "single_jobs",

@@ -252,7 +252,10 @@ def _motors(motors: Sequence[model.MotorNeed]) -> list[list[str]]:
             *(fixed(value, torque) for value in (motor.peak, motor.rms, motor.holding)),
             fixed(motor.speed, 1),
             fixed(motor.power_w, power),
-            *(NONE if value is None else number(value, 3) for value in (motor.rated_limit, motor.peak_limit)),
+            *(
+                NONE if value is None else number(value, 3)
+                for value in (motor.motor_torque, motor.motor_rpm, motor.rated_limit, motor.peak_limit)
+            ),
         ]
         for motor in motors
     ]
