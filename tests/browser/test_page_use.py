@@ -174,6 +174,7 @@ def test_back_leads_to_where_one_was(browser, small_study):
     fold = browser.find_element(By.ID, "judged")
     browser.execute_script("arguments[0].open = true; arguments[0].scrollIntoView()", fold)
     place = "return document.getElementById('judged').getBoundingClientRect().top"
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.find_elements(By.CSS_SELECTOR, ".player canvas"))
     before = browser.execute_script(place)
     browser.execute_script("document.querySelector('.chip a').click()")
     WebDriverWait(browser, PAUSE).until(lambda _: "validation.html" in browser.current_url)
