@@ -280,17 +280,18 @@ function withCursors(figure) {
     figure.append(cursor);
     return { left, bottom, right, top, t0, t1, name, cursor };
   });
-  /** The picture's own edge in the figure: its place less border and padding. */
+  /** The picture's own edge in the figure: in the middle of its place, less border and padding. */
   const inner = () => {
     const style = getComputedStyle(image);
-    const edge = parseFloat(style.paddingLeft) + parseFloat(style.borderLeftWidth);
-    const [x, y] = [image.offsetLeft + edge, image.offsetTop + edge];
-    return { x, y, width: image.offsetWidth - 2 * edge, height: image.offsetHeight - 2 * edge };
+    const edges = 2 * (parseFloat(style.paddingLeft) + parseFloat(style.borderLeftWidth));
+    const scale = Math.min((image.offsetWidth - edges) / image.naturalWidth, (image.offsetHeight - edges) / image.naturalHeight);
+    const [width, height] = [scale * image.naturalWidth, scale * image.naturalHeight];
+    return { x: image.offsetLeft + (image.offsetWidth - width) / 2, y: image.offsetTop + (image.offsetHeight - height) / 2, width, height };
   };
+  image.addEventListener("load", refresh);
   image.addEventListener("click", (event) => {
-    const { width, height } = inner();
-    const edge = (image.offsetWidth - width) / 2;
-    const [u, v] = [(event.offsetX - edge) / width, 1 - (event.offsetY - edge) / height];
+    const { x, y, width, height } = inner();
+    const [u, v] = [(event.offsetX - x + image.offsetLeft) / width, 1 - (event.offsetY - y + image.offsetTop) / height];
     const panel = panels.find(({ left, right, bottom, top }) => u >= left && u <= right && v >= bottom && v <= top);
     if (!panel) return;
     goTo(panel.name, panel.t0 + ((u - panel.left) / (panel.right - panel.left)) * (panel.t1 - panel.t0));
