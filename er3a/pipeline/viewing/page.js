@@ -509,8 +509,7 @@ function linkTo({ address, title, texts }, words) {
   return item;
 }
 
-// Where the text begins that the address names.
-// Of parts that are shown one at a time that one is then shown, whole.
+// Where the text begins that the address names; of parts that are shown one at a time that one is then shown, whole.
 function goToPlace(main, showAll) {
   const beginning = new URLSearchParams(location.search).get("at");
   const begins = (part) => squeezed(allText(part)).startsWith(beginning);

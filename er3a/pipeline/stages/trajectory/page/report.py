@@ -151,7 +151,7 @@ def answer_of(
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
     speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
-    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
+    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance of passing paths"))] if clear else []
     limit = tr("of assumed speed limits") if any(summary.joint_limits.speed_assumed) else tr("of a joint's speed limit")
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), limit)] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
