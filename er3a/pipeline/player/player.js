@@ -346,6 +346,7 @@ for (const link of document.querySelectorAll("[data-t]")) {
     event.preventDefault();
     event.stopPropagation(); // a link to a moment within a row that leads to its end
     goTo(link.dataset.play, Number(link.dataset.t));
+    if (link.closest(".runs")) part("space").scrollIntoView({ block: "nearest" });
     dock(link.getBoundingClientRect().bottom);
     tell();
   });

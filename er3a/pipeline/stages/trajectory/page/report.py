@@ -11,6 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.geometry.transforms import translation
+from er3a.kinematics.forward import forward
 from er3a.pipeline.language import own_title, tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
@@ -102,8 +103,12 @@ def _both_arms(study: Study, stored: Stored[model.TrajectoryResults], played: Se
     if other is robot or other.joints != robot.joints:
         return player(robot, played)
     other = other.replace(base=translation(0.0, -DISTANCE * size_of(robot), 0.0) @ other.base)
-    text = tr("The same joint angles, another pose.")
-    motions = [replace(motion, text=text, beside=(motion.q,)) for motion in played]
+    motions = []
+    for motion in played:
+        off = (forward(robot, motion.q) - forward(study.robot(instead), motion.q))[:, :3, 3]
+        far = fixed(1000 * float(np.linalg.norm(off, axis=1).max()), 0)
+        text = tr("The same joint angles put the flange up to {far} mm off.", far=far)
+        motions.append(replace(motion, text=text, beside=(motion.q,)))
     return player(robot, motions, beside=(other,), signs=[own_title(each.title) for each in (robot, other)])
 
 
