@@ -121,7 +121,9 @@ function draw() {
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
   arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  others.forEach((own, k) => sticks(own, data.solutions[k], poses[0], others.length > 1 ? String(k + 1) : ""));
+  const numbered = others.map((own, k) => sticks(own, data.solutions[k], poses[0]));
+  const alike = Map.groupBy(others.length > 1 ? numbered.keys() : [], (k) => numbered[k].map((value) => value.toFixed(2)).join());
+  for (const [first, ...more] of alike.values()) if (numbered[first].length) space.word([first, ...more].map((k) => k + 1).join(", "), numbered[first], space.page.muted, false);
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && (touching.has(mesh.shape.name) ? SEEN_THROUGH : FAINT));
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
@@ -156,14 +158,14 @@ function draw() {
   space.end();
 }
 
-/** An arm as lines between its joints, which hide nothing; its joints where those of the arm that is shown are not, and its number. */
-function sticks(poses, css, shown, number) {
+/** An arm as lines between its joints, which hide nothing; its joints where those of the arm that is shown are not. Returns the one farthest off, or []. */
+function sticks(poses, css, shown) {
   const joints = poses.map((T) => column(T, 3));
   const off = joints.filter((joint, k) => Math.hypot(...subtract(joint, column(shown[k], 3))) > CLOSED * data.size);
   if (off.length) space.line(joints, css, 4);
   off.forEach((joint) => space.dot(joint, css, 4.5));
   const away = (joint) => Math.min(...shown.map((T) => Math.hypot(...subtract(joint, column(T, 3)))));
-  if (number && off.length) space.word(number, off.reduce((a, b) => (away(b) > away(a) ? b : a)), space.page.muted, false);
+  return off.length ? off.reduce((a, b) => (away(b) > away(a) ? b : a)) : [];
 }
 
 /** The axis of row `j`, whose frame is `T`, through the whole picture. */
@@ -204,14 +206,13 @@ function tell() {
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : motion.text;
-  const gravest = now.filter(({ status }) => status === now[0].status); // the first fault of these is the cause; of lines the last is carried out
-  show(nowShown, gravest.at(now[0]?.status === "plain" ? -1 : 0)?.text || ends);
+  show(nowShown, now[0]?.text || ends); // the first fault is the cause
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
+  const on = stretches.filter(({ dataset }) => dataset.play === motion.name && isNow({ t: Number(dataset.from), until: Number(dataset.t) }));
   for (const part of stretches) {
-    const [from, to] = [Number(part.dataset.from), Number(part.dataset.t)];
-    const now = part.dataset.play === motion.name && t >= from - ROUNDED && t <= to + ROUNDED;
+    const now = part === on[0] || (on.includes(part) && part.dataset.from === part.dataset.t); // where two meet, the first; what has no motion too
     if (now && !part.classList.contains("now")) listed(part);
     part.classList.toggle("now", now);
   }
@@ -280,17 +281,18 @@ function withCursors(figure) {
     figure.append(cursor);
     return { left, bottom, right, top, t0, t1, name, cursor };
   });
-  /** The picture's own edge in the figure: its place less border and padding. */
+  /** The picture's own edge in the figure: in the middle of its place, less border and padding. */
   const inner = () => {
     const style = getComputedStyle(image);
-    const edge = parseFloat(style.paddingLeft) + parseFloat(style.borderLeftWidth);
-    const [x, y] = [image.offsetLeft + edge, image.offsetTop + edge];
-    return { x, y, width: image.offsetWidth - 2 * edge, height: image.offsetHeight - 2 * edge };
+    const edges = 2 * (parseFloat(style.paddingLeft) + parseFloat(style.borderLeftWidth));
+    const scale = Math.min((image.offsetWidth - edges) / image.naturalWidth, (image.offsetHeight - edges) / image.naturalHeight);
+    const [width, height] = [scale * image.naturalWidth, scale * image.naturalHeight];
+    return { x: image.offsetLeft + (image.offsetWidth - width) / 2, y: image.offsetTop + (image.offsetHeight - height) / 2, width, height };
   };
+  image.addEventListener("load", refresh);
   image.addEventListener("click", (event) => {
-    const { width, height } = inner();
-    const edge = (image.offsetWidth - width) / 2;
-    const [u, v] = [(event.offsetX - edge) / width, 1 - (event.offsetY - edge) / height];
+    const { x, y, width, height } = inner();
+    const [u, v] = [(event.offsetX - x + image.offsetLeft) / width, 1 - (event.offsetY - y + image.offsetTop) / height];
     const panel = panels.find(({ left, right, bottom, top }) => u >= left && u <= right && v >= bottom && v <= top);
     if (!panel) return;
     goTo(panel.name, panel.t0 + ((u - panel.left) / (panel.right - panel.left)) * (panel.t1 - panel.t0));
@@ -344,6 +346,7 @@ for (const link of document.querySelectorAll("[data-t]")) {
     event.preventDefault();
     event.stopPropagation(); // a link to a moment within a row that leads to its end
     goTo(link.dataset.play, Number(link.dataset.t));
+    if (link.closest(".runs")) part("space").scrollIntoView({ block: "nearest" });
     dock(link.getBoundingClientRect().bottom);
     tell();
   });

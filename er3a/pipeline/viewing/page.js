@@ -509,8 +509,7 @@ function linkTo({ address, title, texts }, words) {
   return item;
 }
 
-// Where the text begins that the address names.
-// Of parts that are shown one at a time that one is then shown, whole.
+// Where the text begins that the address names; of parts that are shown one at a time that one is then shown, whole.
 function goToPlace(main, showAll) {
   const beginning = new URLSearchParams(location.search).get("at");
   const begins = (part) => squeezed(allText(part)).startsWith(beginning);
@@ -737,7 +736,7 @@ for (const link of document.querySelectorAll("nav [data-stage]")) {
 document.querySelector("nav [aria-current]")?.scrollIntoView({ inline: "center", block: "nearest" }); // where the pages' names don't fit
 
 // The row of the list whose moment or picture is shown.
-const rows = [...document.querySelectorAll(".runs:not(.plain) a")];
+const rows = [...document.querySelectorAll(".runs:not(.plain) a[href]")];
 const fix = rows.some((row) => row.dataset.fix) && document.querySelector(".hero .fix"); // it follows the row
 const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));

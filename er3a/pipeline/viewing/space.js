@@ -244,7 +244,7 @@ export class Space extends Orbit {
       if (max.distanceTo(min) < 4 * SMALL * this.length) this.keepClear([middle], radius);
       return [...middle.slice(0, 2), max.z];
     });
-    named.forEach(({ shape: { name } }, k) => this.word(name, tops[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name)));
+    named.forEach(({ shape: { name } }, k) => this.word(name, tops[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name) || named.length < 5));
   }
 
   #light() {

@@ -241,8 +241,8 @@ def last_safe_stop(task: MotionTask, motion: Motion, found: Judgement, margin: f
 
     The end of the margin is searched for on a grid up to the first contact, or to where the motion leaves limits or
     reach, and proven: where the clearance along the motion up to it is less, it is moved back. Of links that touch by
-    design at their joint, which have no margin to keep there, those that overlap elsewhere keep half of their first
-    distance.
+    design at their joint, which may have no margin to keep there, those that overlap elsewhere and begin within it keep
+    half of their first distance.
     """
     contacts, bodies, acceleration = found.along.contacts, task.bodies, task.limits.acceleration
     if not contacts:
@@ -254,7 +254,8 @@ def last_safe_stop(task: MotionTask, motion: Motion, found: Judgement, margin: f
         """Distances (k, joined), m, at times (k,)."""
         return np.array([bodies.distances(q, joined) for q in motion.joints(t)])
 
-    kept = np.minimum(margin, apart(np.zeros(1))[0] / 2) if joined.size else np.empty(0)
+    begin = apart(np.zeros(1))[0] if joined.size else np.empty(0)
+    kept = np.where(begin > margin, margin, begin / 2)
 
     def beyond(t: Reals) -> Reals:
         """By how much (k,), m, more than the margin is kept at times (k,)."""

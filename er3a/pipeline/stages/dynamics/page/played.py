@@ -9,6 +9,7 @@ import numpy as np
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of, fixed, number
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.dynamics.model import DynamicsResults, HoldingTorque, JointLoad, LinkEntry, MassesUsed
 from er3a.pipeline.viewing.drawn import poses_at
@@ -29,7 +30,10 @@ def motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
             continue
         rows = results.torques.take(results.torques.path == path.name)
         felt = [load for load in path.joints if load.peak > FELT * path.hardest.peak]
-        peaks = [PlayedEvent(load.peak_at_s, load.peak_at_s, _peak(load), "plain") for load in felt]
+        peaks = [
+            PlayedEvent(t, t, joined([_peak(load) for load in felt if load.peak_at_s == t], ", "), "plain")
+            for t in dict.fromkeys(load.peak_at_s for load in felt)
+        ]
         motions.append(PlayedMotion(path.name, path.name, rows.t_s, meant(robot, rows.q), peaks, loads=rows.torque))
     return motions
 

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.finding import is_one
-from er3a.pipeline.language import first_sentence, tr, with_unit
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import NEAREST_RULE
 from er3a.pipeline.messages.kinematics import branch_word
@@ -112,7 +112,7 @@ def _row(target: model.TargetResult) -> ListRow:
     if target.outcome == "reached":
         mark = "caution" if _singular(target) else "pass"
     advice = listed(target.advice) if mark == "fail" else ()
-    fix = Fix(first_sentence(advice[-1])[0], f"#{target.name}") if advice else None
+    fix = Fix(advice[-1], f"#{target.name}") if advice else None
     return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
 
 

@@ -76,7 +76,7 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
             each.name,
             _cost(float(shown[each.name].t[-1]), each.least_clearance_mm),
             f"#{each.name}",
-            (each.name, 0.0),
+            (each.name, _nearest_s(results, each.name)),
             1.0,
         )
         for each in good
@@ -86,6 +86,13 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     clear = [each.least_clearance_mm for each in good if each.least_clearance_mm]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     return Answer(headline, rest, "", keys, judged([*bad.values(), *sound]), fix_of(wrong))
+
+
+def _nearest_s(results: model.ProgramsResults, name: str) -> float:
+    """When the line of a program that comes nearest to anything is done, s; its start where that was not measured."""
+    rows, motion = (each.take(each.program == name) for each in (results.instructions, results.motion))
+    near = np.flatnonzero(rows.clearance_mm == np.fmin.reduce(rows.clearance_mm, initial=np.inf))
+    return next((t1 for line, _, _, t1 in stretches(motion) if line in rows.line[near]), 0.0)
 
 
 def _cost(time_s: float, clear_mm: float | None) -> str:

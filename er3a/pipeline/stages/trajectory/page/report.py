@@ -11,6 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.geometry.transforms import translation
+from er3a.kinematics.forward import forward
 from er3a.pipeline.language import own_title, tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
@@ -102,8 +103,12 @@ def _both_arms(study: Study, stored: Stored[model.TrajectoryResults], played: Se
     if other is robot or other.joints != robot.joints:
         return player(robot, played)
     other = other.replace(base=translation(0.0, -DISTANCE * size_of(robot), 0.0) @ other.base)
-    text = tr("The same joint angles, another pose.")
-    motions = [replace(motion, text=text, beside=(motion.q,)) for motion in played]
+    motions = []
+    for motion in played:
+        off = (forward(robot, motion.q) - forward(study.robot(instead), motion.q))[:, :3, 3]
+        far = fixed(1000 * float(np.linalg.norm(off, axis=1).max()), 0)
+        text = tr("The same joint angles put the flange up to {far} mm off.", far=far)
+        motions.append(replace(motion, text=text, beside=(motion.q,)))
     return player(robot, motions, beside=(other,), signs=[own_title(each.title) for each in (robot, other)])
 
 
@@ -151,7 +156,7 @@ def answer_of(
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
     speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
-    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
+    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance of passing paths"))] if clear else []
     limit = tr("of assumed speed limits") if any(summary.joint_limits.speed_assumed) else tr("of a joint's speed limit")
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), limit)] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)

@@ -138,12 +138,12 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
     task = load_vision(str(study.entry(name).vision))
-    robot = study.robot(name)
+    robot, answer = study.robot(name), _answer(results, task)
     render_stage(
         study,
         stored,
         output,
-        _answer(results, task),
+        answer,
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
@@ -156,7 +156,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
             robot,
             motions(robot, results, task),
             scene,
-            opened=next((grasp_moment(results, each) for each in summary.objects), None),
+            opened=next((group.rows[0].play for group in answer.shown_groups), None),
             added=seen_shapes(robot, task, summary),
         ),
         drawing_head=drawing_head(),
@@ -196,12 +196,12 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
         mm, deg, each = worst
         groups.append(_errors(each.name, mm, deg, limit, grasp_moment(results, each)))
     if found and (found.suspects or found.warnings):
-        rows = [ListRow("caution", each.sample, _why_left_out(each), "#camera") for each in found.suspects]
-        rows += [ListRow("caution", tr("camera"), say(each), "#camera") for each in found.warnings]
+        rows = [ListRow("caution", each.sample, _why_left_out(each)) for each in found.suspects]
+        rows += [ListRow("caution", tr("camera"), say(each)) for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
     gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
     text = tr("give the tool a shape (“carried”).")
-    return Answer(headline, rest, below, keys, groups, Fix(text, "#verdict", False) if "gripper" in gaps else None)
+    return Answer(headline, rest, below, keys, groups, Fix(text, "#carried", False) if "gripper" in gaps else None)
 
 
 def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
