@@ -32,7 +32,7 @@ LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be dra
 SHORTEST_AXIS = 0.06  # half of a joint's axis, in parts of the arm's size: it is to be seen beyond a housing
 ROD, SHORTEST = 0.016, 1e-6  # radius of a link that has no shape, in parts of the arm's size; m
 PLATE_RADIUS, PLATE_HEIGHT = 0.1, 0.008  # of the plate below the arm, in parts of its size
-RING, CAP = (1.03, 0.3), (0.62, 1.03)  # radius and half length of a joint, in radii of the link
+RING, CAP = (1.03, 0.3), (0.62, 1.12)  # radius and half length of a joint, in radii of the link
 PLANE_SIZE, PLANE_THICKNESS = 1.6, 0.002  # of a plane, in parts of the arm's size, and m
 
 Shape = dict[str, Any]

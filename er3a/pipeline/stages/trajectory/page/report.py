@@ -107,7 +107,7 @@ def _both_arms(study: Study, stored: Stored[model.TrajectoryResults], played: Se
     for motion in played:
         off = (forward(robot, motion.q) - forward(study.robot(instead), motion.q))[:, :3, 3]
         far = fixed(1000 * float(np.linalg.norm(off, axis=1).max()), 0)
-        text = tr("The same joint angles put the flange up to {far} mm off.", far=far)
+        text = tr("The same joint angles put the tool up to {far} mm off.", far=far)
         motions.append(replace(motion, text=text, beside=(motion.q,)))
     return player(robot, motions, beside=(other,), signs=[own_title(each.title) for each in (robot, other)])
 
