@@ -89,8 +89,9 @@ def _answer(
         if least
         else []
     )
-    free = [float(each.value) for each in summary.figures if each.name == "free_of_collisions"]
-    keys += [(with_unit(fixed(share, 0), "%"), tr("joint space free")) for share in free]
+    free = next((each.value for each in summary.figures if each.name == "free_of_collisions"), None)
+    if free is not None:
+        keys.append((with_unit(fixed(free, 0), "%"), tr("joint space free")))
     titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
     return Answer(
         tr("{count} of {due} cases are clear.", count=len(clear), due=due) if due else tr("Collisions checked."),

@@ -90,7 +90,8 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
 
 def _nearest_s(results: model.ProgramsResults, name: str) -> float:
     """When the line of a program that comes nearest to anything is done, s; its start where that was not measured."""
-    rows, motion = (each.take(each.program == name) for each in (results.instructions, results.motion))
+    rows = results.instructions.take(results.instructions.program == name)
+    motion = results.motion.take(results.motion.program == name)
     near = np.flatnonzero(rows.clearance_mm == np.fmin.reduce(rows.clearance_mm, initial=np.inf))
     return next((t1 for line, _, _, t1 in stretches(motion) if line in rows.line[near]), 0.0)
 

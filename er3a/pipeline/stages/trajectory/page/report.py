@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from markupsafe import Markup
 
+from er3a.comparison.compare import shift_between
 from er3a.geometry.transforms import translation
 from er3a.kinematics.forward import forward
 from er3a.pipeline.language import own_title, tr, using, with_unit
@@ -99,14 +100,14 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
 def _both_arms(study: Study, stored: Stored[model.TrajectoryResults], played: Sequence[PlayedMotion]) -> Markup:
     """An arm whose table evidence contradicts beside that of the table to use instead, at the same joint values."""
     robot, instead = study.robot(stored.robot), alternative_table(study, stored)
-    other = study.robot(instead) if instead else robot
-    if other is robot or other.joints != robot.joints:
+    right = study.robot(instead) if instead else robot
+    if right is robot or right.joints != robot.joints:
         return player(robot, played)
-    other = other.replace(base=translation(0.0, -DISTANCE * size_of(robot), 0.0) @ other.base)
+    other = right.replace(base=translation(0.0, -DISTANCE * size_of(robot), 0.0) @ right.base)
     motions = []
     for motion in played:
-        off = (forward(robot, motion.q) - forward(study.robot(instead), motion.q))[:, :3, 3]
-        far = fixed(1000 * float(np.linalg.norm(off, axis=1).max()), 0)
+        off = shift_between(forward(robot, motion.q), forward(right, motion.q))
+        far = fixed(1000 * float(off.max()), 0)
         text = tr("The same joint angles put the tool up to {far} mm off.", far=far)
         motions.append(replace(motion, text=text, beside=(motion.q,)))
     return player(robot, motions, beside=(other,), signs=[own_title(each.title) for each in (robot, other)])
