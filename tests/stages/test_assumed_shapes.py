@@ -81,7 +81,7 @@ def test_recordings_call_no_path_safe_without_saying_of_what(small_results):
     close = replace(results, summary=replace(summary, verdict=nearer))
     for found, status, words in (
         (results, "plain", "pass"),
-        (close, "caution", "clear of assumed shapes only"),
+        (close, "caution", f"{sound[0].clearance.least_mm:.1f} mm clear (assumed)"),
     ):
         run = next(runs_of_path(load_robot("er3a_c60"), found, sound[0]))
         assert (run.status, run.outcome) == (status, words)

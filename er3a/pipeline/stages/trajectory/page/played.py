@@ -249,7 +249,7 @@ def shown_verdict(path: model.PathSummary, near: Finding | None) -> tuple[Weight
     if path.verdict == "safe" and path.of_program:
         return weight, tr("fault in its program") if weight == "fail" else tr("doubt in its program")
     if path.verdict == "safe" and near:
-        return "caution", tr("{far} mm clear", far=fixed(near.clearance_mm, 1))
+        return "caution", tr("{far} mm clear (assumed)", far=fixed(near.clearance_mm, 1))
     said = {each: outcome_word(each) for each in path.outcomes}
     if path.collisions:
         said["collides"] = hit_word(path.collisions[0].cause.touches[0].pair)
