@@ -122,8 +122,11 @@ function draw() {
   arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
   const numbered = others.map((own, k) => sticks(own, data.solutions[k], poses[0]));
-  const alike = Map.groupBy(others.length > 1 ? numbered.keys() : [], (k) => numbered[k].map((value) => value.toFixed(2)).join());
-  for (const [first, ...more] of alike.values()) if (numbered[first].length) space.word([first, ...more].map((k) => k + 1).join(", "), numbered[first], space.page.muted, false);
+  const keys = numbered.map((at) => at.map((value) => value.toFixed(2)).join());
+  for (const key of others.length > 1 ? new Set(keys) : []) {
+    const those = keys.flatMap((own, k) => (own === key ? [k + 1] : []));
+    if (key) space.word(those.join(", "), numbered[those[0] - 1], space.page.muted, false);
+  }
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && (touching.has(mesh.shape.name) ? SEEN_THROUGH : FAINT));
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
