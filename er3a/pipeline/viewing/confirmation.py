@@ -35,7 +35,7 @@ def write_confirmation(
     command : that made it; files : what it was made from
     """
     _, headline, *lines = lines_of(found, nearest=nearest)
-    kind, said = headline.split(";")[0].split(": ")  # the key figures say the rest
+    kind, _, said = headline.partition(";")[0].partition(": ")  # the key figures say the rest
     arms = [seen_arm(robot, own_title(robot.title), "model", "right" if found.verdict == "agrees" else "wrong")]
     if found.verdict not in ("agrees", "open"):
         arms.insert(0, seen_arm(found.corrected, "Controller", "", "right"))
