@@ -131,6 +131,14 @@ def asked_recordings(robot):
     return [stage for stage in asked_stages(robot) if "record" in STAGES[stage].views]
 
 
+def shown_early(robot, stages):
+    """The words by which the job of a first run's first robot writes a page before it goes on: one that shows no other
+    results."""
+    first = next((name for name in ROBOTS if not STUDY.other_tables(name)), None)
+    early = robot == first and "validation" in stages and not Path("reports/index.html").exists()
+    return "--show validation" if early else ""
+
+
 def views_of(robot, stages):
     """Paths of recordings with their pictures."""
     return [f"reports/{robot}/{stage}.{kind}" for stage in stages for kind in ("rrd", "webp")]

@@ -15,13 +15,15 @@ for robot in ROBOTS:
                     [update(path) for stage in asked for path in results_of(robot, stage)],
                 log:
                     f"logs/{robot}/{job}.compute.log",
-                priority: 2 if job == "model" else 1  # most robots have no more than that
+                # Most robots have no more than a model's job; the first one's has a page to read.
+                priority: 3 if shown_early(robot, asked) else 2 if job == "model" else 1
                 conda:
                     "../envs/er3a.yaml"
                 resources:
                     **{f"compiles_{stage}": 1 for stage in asked},
                     # No parameter: results do not become others because fewer are asked for.
                     asked=asked_of(asked),
+                    shown=shown_early(robot, asked),
                 params:
                     robot=robot,
                     settings={stage: STUDY.computed_from(robot, stage) for stage in stages},
@@ -31,7 +33,7 @@ for robot in ROBOTS:
                 message:
                     f"{robot}: compute {', '.join(asked)}"
                 shell:
-                    f"{ER3A} compute {{resources.asked}} {{params.robot}} 2> {{log}}"
+                    f"{ER3A} compute {{resources.asked}} {{params.robot}} {{resources.shown}} 2> {{log}}"
 
 
 for stage in STAGES.values():

@@ -39,6 +39,7 @@ def compute(
     results: options.Results = options.DEFAULT_RESULTS,
     *,
     changed: Annotated[bool, typer.Option("--changed", help="only stages whose results are not up to date")] = False,
+    show: Annotated[str, typer.Option(metavar="STAGE", help="write this one's page, too, as soon as it can be")] = "",
 ):
     """Compute a stage: tables and summary.json."""
     from er3a.pipeline.stages import run
@@ -50,6 +51,10 @@ def compute(
             continue
         if absent := run.compute(name, loaded, robot, folder):
             options.print_note(f"{robot}, {name}: {absent}")
+        if name == show:
+            with language.using("en"):  # which it is again for the other stages
+                views(robot, [show], study, results)
+            print(f"{options.DEFAULT_REPORTS / robot / show}.html can be read while the rest is computed", flush=True)
 
 
 @options.app.command(rich_help_panel=options.JOBS)
@@ -70,6 +75,11 @@ def views(
     loaded.entry(robot)
     named = [_known(page, (*STAGES, TEACH)) for page in pages or loaded.pages(robot)]
     stages = [STAGES[page] for page in named if page != TEACH]
+    with house_style():
+        for stage in stages:
+            page = reports / robot / f"{stage.name}.html"
+            run.show("report", stage.name, loaded, robot, results / robot / stage.name, page)
+            write_checksum(page)
     with language.using("en"):
         for stage in stages:
             if "record" in stage.views:
@@ -77,11 +87,6 @@ def views(
                 run.show("record", stage.name, loaded, robot, results / robot / stage.name, recording)
                 write_checksum(recording)
                 write_checksum(recording.with_suffix(".webp"))
-    with house_style():
-        for stage in stages:
-            page = reports / robot / f"{stage.name}.html"
-            run.show("report", stage.name, loaded, robot, results / robot / stage.name, page)
-            write_checksum(page)
     if TEACH in named:
         _write_teach_page(loaded, robot, results, reports)
 
