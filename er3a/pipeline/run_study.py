@@ -163,8 +163,8 @@ class RunLog(LogHandlerBase):
 def _concerns_a_person(record: LogRecord) -> bool:
     """Whether a plain message of Snakemake is shown: what it warns of, unless a job's own line has said it."""
     text = record.getMessage()
-    if text.startswith("Exiting because a job execution failed"):
-        return False
+    if text.startswith("Exiting because a job execution failed") or "were not present when the DAG was created" in text:
+        return False  # a first page is there before its job, which writes the same again
     return record.levelno >= WARNING or text.startswith("Nothing to be done")
 
 

@@ -75,18 +75,18 @@ def views(
     loaded.entry(robot)
     named = [_known(page, (*STAGES, TEACH)) for page in pages or loaded.pages(robot)]
     stages = [STAGES[page] for page in named if page != TEACH]
-    with house_style():
-        for stage in stages:
-            page = reports / robot / f"{stage.name}.html"
-            run.show("report", stage.name, loaded, robot, results / robot / stage.name, page)
-            write_checksum(page)
     with language.using("en"):
-        for stage in stages:
+        for stage in stages:  # first: pages show their pictures where there is no WebGL
             if "record" in stage.views:
                 recording = reports / robot / f"{stage.name}.rrd"
                 run.show("record", stage.name, loaded, robot, results / robot / stage.name, recording)
                 write_checksum(recording)
                 write_checksum(recording.with_suffix(".webp"))
+    with house_style():
+        for stage in stages:
+            page = reports / robot / f"{stage.name}.html"
+            run.show("report", stage.name, loaded, robot, results / robot / stage.name, page)
+            write_checksum(page)
     if TEACH in named:
         _write_teach_page(loaded, robot, results, reports)
 
