@@ -112,15 +112,30 @@ def plain(value: Any) -> Any:
     -------
     value : dicts, lists and plain values; a NaN stays
     """
+    opened = opened_once(value)
+    if isinstance(opened, dict):
+        return {key: plain(part) for key, part in opened.items()}
+    return [plain(part) for part in opened] if isinstance(opened, list | tuple) else opened
+
+
+def opened_once(value: Any) -> Any:
+    """A value as JSON has it, but for the values that it holds: what :func:`json.dump` takes as ``default``.
+
+    Parameters
+    ----------
+    value : as :func:`plain` takes it
+
+    Returns
+    -------
+    value : a dict, list, tuple or plain value
+    """
     if isinstance(value, Finding):
-        found = {"code": value.code, "params": plain(value.params)}
+        found = {"code": value.code, "params": value.params}
         return found | ({"basis": value.basis} if value.basis == "assumed" else {})
     if is_dataclass(value) and not isinstance(value, type):
-        return {part.name: plain(getattr(value, part.name)) for part in fields(value)}
+        return {part.name: getattr(value, part.name) for part in fields(value)}
     if isinstance(value, Mapping):
-        return {key: plain(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(part) for part in value]
+        return dict(value)
     if isinstance(value, np.ndarray):
         return value.tolist()
     return value.item() if isinstance(value, np.generic) else value

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy
 
 from er3a.geometry.transforms import rpy_of, transform
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
-RANDOM_ORIENTATIONS = 4000  # a ratio of these is known to 1 %
+ORIENTATIONS = 2000  # a ratio of these is known to 1 %
 TURN_GRID, SHIFT_GRID = 41, 25  # changes across at first: 9 deg, and a twelfth of the arm's reach
 FINE_GRID, REFINEMENTS = 9, 5  # changes across when refined, each time to a quarter, and how often
 
@@ -33,12 +36,12 @@ Usable = Callable[[Reals], Flags]
 class Neighbours:
     """Poses near a refused one that have a solution within the limits.
 
-    The smallest turn is searched over a grid of all turns, the smallest shift over one that spans the arm; both grids
-    are refined around their best point, so both are upper bounds.
+    The smallest turn is searched over a grid of all turns, if some orientation has a solution at all; the smallest
+    shift over one that spans the arm. Both grids are refined around their best point, so both are upper bounds.
 
     Attributes
     ----------
-    orientation_ratio : part of 4000 random tool orientations at the target's position that have a solution
+    orientation_ratio : part of 2000 tool orientations, spread evenly, that have a solution at the target's position
     least_turn : rad, smallest rotation of the tool found that has one, position kept; None if none has
     turned_to : (3,), rad, roll, pitch and yaw where that turn ends; None if none has
     least_shift : m, smallest shift of the tool found that has one, orientation kept; None if none has
@@ -72,13 +75,12 @@ def solvable(robot: Robot, T: Reals, usable: Usable | None = None) -> Flags:
     return solved
 
 
-def neighbours(robot: Robot, T: Reals, random: np.random.Generator, usable: Usable | None = None) -> Neighbours:
+def neighbours(robot: Robot, T: Reals, usable: Usable | None = None) -> Neighbours:
     """Search poses near a refused one that have a solution within the limits.
 
     Parameters
     ----------
     T : (4, 4), m
-    random : draws the orientations for the ratio
     usable : which arms count. If given, the poses are fit for advice: beyond the smallest usable turn or shift by one
         of ``SPARE_TURNS`` or ``SPARE_SHIFTS``, and usable after rounding for display
 
@@ -86,13 +88,10 @@ def neighbours(robot: Robot, T: Reals, random: np.random.Generator, usable: Usab
     -------
     found : rad and m; the turn and the shift are upper bounds of the smallest ones
     """
-    random_turns = scipy.spatial.transform.Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_rotvec()
 
     def turned(turns: Reals) -> Reals:
         """Poses (N, 4, 4) turned by rotation vectors (N, 3)."""
-        poses = np.tile(T, (len(turns), 1, 1))
-        poses[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(turns).as_matrix() @ T[:3, :3]
-        return poses
+        return _turned(T, scipy.spatial.transform.Rotation.from_rotvec(turns).as_matrix())
 
     def shifted(shifts: Reals) -> Reals:
         """Poses (N, 4, 4) shifted by vectors (N, 3), m."""
@@ -101,16 +100,33 @@ def neighbours(robot: Robot, T: Reals, random: np.random.Generator, usable: Usab
         return poses
 
     half = size_of(robot) + float(np.linalg.norm(robot.last_to_tool[:3, 3]))
-    turn = _least(robot, turned, (np.zeros(3), np.pi, TURN_GRID), usable, SPARE_TURNS)
+    ratio = float(solvable(robot, _turned(T, _orientations())).mean())
+    turn = _least(robot, turned, (np.zeros(3), np.pi, TURN_GRID), usable, SPARE_TURNS) if ratio else None
     shift = _least(robot, shifted, (robot.base[:3, 3] - T[:3, 3], half, SHIFT_GRID), usable, SPARE_SHIFTS)
     back = None if turn is None else scipy.spatial.transform.Rotation.from_matrix(turn[:3, :3] @ T[:3, :3].T)
     return Neighbours(
-        orientation_ratio=float(solvable(robot, turned(random_turns)).mean()),
+        orientation_ratio=ratio,
         least_turn=None if back is None else float(back.magnitude()),
         turned_to=None if turn is None else rpy_of(turn),
         least_shift=None if shift is None else float(np.linalg.norm(shift[:3, 3] - T[:3, 3])),
         shifted_to=None if shift is None else shift[:3, 3],
     )
+
+
+@cache
+def _orientations() -> Reals:
+    """Rotations (ORIENTATIONS, 3, 3), spread evenly (Shoemake's way from a cube to all quaternions)."""
+    share, first, second = quasi_random_points(np.zeros(3), np.array([1, TURN, TURN]), ORIENTATIONS).T
+    a, b = np.sqrt(1 - share), np.sqrt(share)
+    quaternions = np.stack([a * np.sin(first), a * np.cos(first), b * np.sin(second), b * np.cos(second)], axis=1)
+    return np.asarray(scipy.spatial.transform.Rotation.from_quat(quaternions).as_matrix())
+
+
+def _turned(T: Reals, turns: Reals) -> Reals:
+    """Poses (N, 4, 4): a pose (4, 4) turned about its place by rotations (N, 3, 3)."""
+    poses = np.tile(T, (len(turns), 1, 1))
+    poses[:, :3, :3] = turns @ T[:3, :3]
+    return poses
 
 
 def _least(

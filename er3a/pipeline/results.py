@@ -20,7 +20,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_type_hints
 
@@ -30,7 +30,7 @@ from er3a.by_value import ByValue
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically, write_text
-from er3a.finding import Finding, fact, plain
+from er3a.finding import Finding, fact, opened_once, plain
 from er3a.pipeline.code_digest import numbers_digest
 from er3a.pipeline.language import N_
 from er3a.pipeline.scope import Check, Coverage, Open
@@ -236,19 +236,23 @@ def write_results(
         rows = table.empty() if kind is AbsentResults else getattr(results, name)
         write_atomically(folder / f"{name}.parquet", rows.write)
     summary = results.summary
-    own = {part.name: plain(getattr(summary, part.name)) for part in fields(summary)}
-    own["verdict"] = _verdict_record(summary.verdict)
+    own = opened_once(summary) | {"verdict": _verdict_record(summary.verdict)}
     origin = Provenance(
         inputs=input_records(study.inputs(robot, stage.name)) if read is None else read,
         config=study.computed_from(robot, stage.name),
         seed=study.seed,
         code=numbers_digest(),
     )
-    content = {"format_version": FORMAT_VERSION, "robot": robot, "stage": stage.name, **own}
-    text = json.dumps(content | {"provenance": plain(origin)}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    if kind is not AbsentResults:
-        _parsed(folder / SUMMARY, json.loads(text), kind)  # what is written can be read
-    write_text(folder / SUMMARY, text)
+    content = {"format_version": FORMAT_VERSION, "robot": robot, "stage": stage.name, **own, "provenance": origin}
+
+    def write(file: Path) -> None:  # bit by bit: of thousands of targets a text would be large
+        with file.open("w", encoding="utf-8", newline="\n") as out:
+            json.dump(content, out, indent=1, ensure_ascii=False, allow_nan=False, default=opened_once)
+            out.write("\n")
+        if kind is not AbsentResults:
+            _parsed(folder / SUMMARY, json.loads(file.read_bytes()), kind)  # what is written can be read
+
+    write_atomically(folder / SUMMARY, write)
     # Last, so that a folder that was left half-written is not taken for whole.
     write_checksums(folder)
 

@@ -11,12 +11,12 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.neighbours import neighbours, solvable
 
 
-def test_neighbours_find_the_way_back_into_reach(random):
+def test_neighbours_find_the_way_back_into_reach():
     robot = load_robot("er3_600")
     outward = forward(robot, np.radians([0, -80, 80, 0, 0, 0]))  # arm nearly stretched out forwards
     T = outward.copy()
     T[0, 3] += 0.1
-    near = neighbours(robot, T, random)
+    near = neighbours(robot, T)
     assert not solvable(robot, T[None])[0]
     assert 0.05 < near.least_shift <= 0.1 + 2e-3
     moved = T.copy()
@@ -24,18 +24,18 @@ def test_neighbours_find_the_way_back_into_reach(random):
     assert solvable(robot, moved[None])[0]
 
 
-def test_neighbours_find_the_way_from_far_off(random):
+def test_neighbours_find_the_way_from_far_off():
     robot = load_robot("er3_600")
     T = forward(robot, np.zeros(6))
     T[1, 3] = 90.0
-    assert neighbours(robot, T, random).least_shift == pytest.approx(90, abs=0.7)
+    assert neighbours(robot, T).least_shift == pytest.approx(90, abs=0.7)
 
 
-def test_neighbours_find_an_orientation(random):
+def test_neighbours_find_an_orientation():
     robot = load_robot("er3_600")
     T = forward(robot, np.radians([0, -20, 20, 0, 0, 0]))
     T[:3, :3] = Rotation.from_euler("y", -140, degrees=True).as_matrix() @ T[:3, :3]
-    near = neighbours(robot, T, random)
+    near = neighbours(robot, T)
     assert not solvable(robot, T[None])[0]
     assert 0 < near.least_turn < np.pi / 2
     assert 0 < near.orientation_ratio < 1

@@ -40,7 +40,7 @@ def target(T: np.ndarray) -> Target:
 
 
 def solved(T: np.ndarray, scene: Scene | None):
-    return solve_target(ROBOT, target(T), np.random.default_rng(0), scene, clearance=CLEARANCE).result
+    return solve_target(ROBOT, target(T), scene, clearance=CLEARANCE).result
 
 
 def refused_poses() -> dict[str, np.ndarray]:

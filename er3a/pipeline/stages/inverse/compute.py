@@ -65,7 +65,6 @@ class SolvedTarget:
 def solve_target(
     robot: Robot,
     target: Target,
-    random: np.random.Generator,
     scene: Scene | None = None,
     *,
     many: bool = False,
@@ -99,7 +98,7 @@ def solve_target(
             obstacle = _obstacle(robot, target, len(found))
         if advise and has_branches(robot):
             usable = _usable(robot, scene, clearance)
-            near = stated(model.NeighbourPoses, neighbours(robot, target.T, random, usable))
+            near = stated(model.NeighbourPoses, neighbours(robot, target.T, usable))
             advice = (*advice, *_what_would_help(near, clearance))
     quaternion = scipy.spatial.transform.Rotation.from_matrix(target.T[:3, :3]).as_quat(
         canonical=True, scalar_first=True
@@ -332,7 +331,7 @@ STAGE_NAME = "inverse"
 REPRODUCED_M = 1e-9  # by which a solution may miss its target: far above the rounding of a solution in closed form
 REPRODUCED_RAD = 1e-9
 MAX_ADVISED = 100  # of many targets those for which it is looked for what would help
-ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1
+ROUND_TRIP_STREAM = 1
 
 
 def compute(study: Study, name: str) -> model.InverseResults:
@@ -360,10 +359,9 @@ def compute(study: Study, name: str) -> model.InverseResults:
     clearance = margin if assumed else motion.penetration_tolerance_mm / 1000
     many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()
     with shown_work(f"{name}: solving {len(targets)} targets"):
-        for number, target in enumerate(targets):
-            random = np.random.default_rng([study.seed, ADVICE_STREAM, number])
+        for target in targets:
             advise = not many or advised < MAX_ADVISED
-            solved.append(solve_target(robot, target, random, scene, many=many, advise=advise, clearance=clearance))
+            solved.append(solve_target(robot, target, scene, many=many, advise=advise, clearance=clearance))
             advised += solved[-1].result.neighbours is not None
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
     solutions = model.SolutionRows.stacked(one.rows for one in solved).of_joints(robot.slides)
