@@ -226,8 +226,6 @@ def write_results(
 
     Raises
     ------
-    ResultError
-        if what was written can't be read back
     WriteError
         if the disk is full or permission is missing
     """
@@ -249,8 +247,6 @@ def write_results(
         with file.open("w", encoding="utf-8", newline="\n") as out:
             json.dump(content, out, indent=1, ensure_ascii=False, allow_nan=False, default=opened_once)
             out.write("\n")
-        if kind is not AbsentResults:
-            _parsed(folder / SUMMARY, json.loads(file.read_bytes()), kind)  # what is written can be read
 
     write_atomically(folder / SUMMARY, write)
     # Last, so that a folder that was left half-written is not taken for whole.

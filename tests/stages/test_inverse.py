@@ -195,7 +195,7 @@ def test_unreachable_target_is_a_verdict(computed):
     assert target.chosen_deg is None
     assert target.solutions == 0
     assert (target.reason.code, target.obstacle.code) == ("no_solution", "reach_missing")
-    assert target.obstacle.gap_mm == min(unsolved.why.gap_mm for unsolved in target.unsolved)
+    assert target.obstacle.gap_mm == min(unsolved.why.gap_mm for unsolved in target.reason.unsolved)
     assert (target.outcome, target.expect) == ("unreachable", "unreachable")
     assert (verdict.status, verdict.finding.code) == ("caution", "inverse.targets")  # no scene was looked at
     assert ("too_far", ("unreachable",)) in {(one.name, one.found) for one in verdict.finding.demonstrations}

@@ -119,7 +119,7 @@ def solve_target(
         reason=choice.reason,
         obstacle=obstacle,
         outcome=_outcome(obstacle),
-        unsolved=solutions.unsolved,
+        unsolved=() if is_one(choice.reason, "no_solution") else solutions.unsolved,
         method=solutions.method,
         families=tuple(map(_self_motion, solutions.families)),
         neighbours=near,

@@ -68,7 +68,7 @@ class TargetResult:
     chosen_deg, chosen_branch : the solution taken; None if there is none
     reason : why it was taken, or why none was; obstacle : the latter in short, None where one was taken
     outcome, expect : what it came to, and what its file says that it should
-    unsolved : why branches, or the pose, have no solution
+    unsolved : why branches have no solution, where others have one; else ``reason`` says why
     neighbours : only for targets without a solution within the limits
     clearance : of the chosen solution; None where nothing can meet
     """
