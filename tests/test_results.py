@@ -187,12 +187,6 @@ def test_a_number_that_is_none_is_refused_and_the_old_file_stays(tmp_path, study
     assert leftovers(tmp_path) == [CHECKSUMS, "rows.parquet", "summary.json"]
 
 
-def test_what_the_model_does_not_allow_is_not_written(tmp_path, study):
-    with pytest.raises(ResultError, match="reach_m"):
-        write(tmp_path, study, replace(SUMMARY, reach_m=("far",)))
-    assert not (tmp_path / "summary.json").exists()
-
-
 def test_a_failing_write_leaves_the_old_file_and_no_temporary(tmp_path):
     path = tmp_path / "new" / "file.txt"
     write_atomically(path, lambda file: file.write_text("old"))
