@@ -152,14 +152,14 @@ def test_what_a_row_of_the_index_leads_to_has_the_whole_answer_in_one_screen(bro
     """Verdict, cause, what to do instead, and the arm at that moment."""
     with chromium.emulating(browser, width=1400, height=1000):
         browser.get((small_study.folder / "reports/index.html").as_uri())
-        link = browser.find_element(By.CSS_SELECTOR, '.tile a[href*="play=line_limits&"]')
+        link = browser.find_element(By.CSS_SELECTOR, '.tile a[href*="play=line_wrist&"]')
         browser.get(link.get_attribute("href"))
         WebDriverWait(browser, PAUSE).until(
             lambda _: browser.execute_script("return performance.getEntriesByName('player').length")
         )
         told = browser.find_element(By.CSS_SELECTOR, ".player .now-shown").text
-        assert "link 2 and link 4" in told
-        assert browser.find_element(By.CSS_SELECTOR, ".runs [aria-current] b").text == "line_limits"
+        assert "singular" in told
+        assert browser.find_element(By.CSS_SELECTOR, ".runs [aria-current] b").text == "line_wrist"
         for part in ("h1", ".player canvas", ".player .now-shown", ".fix", ".runs"):
             top, bottom = browser.execute_script(
                 "const { top, bottom } = document.querySelector(arguments[0]).getBoundingClientRect();"
@@ -467,3 +467,27 @@ def test_the_chart_beside_the_player_is_of_the_motion_that_is_played(browser, sm
         lambda _: browser.find_element(By.CSS_SELECTOR, heading).get_attribute("data-motion") == repaired
     )
     assert shown_row(browser)[:2] == [row, repaired]
+
+
+MARKED = """
+const parts = [...document.querySelectorAll("[data-entry].shown")];
+const seen = parts.filter((part) => part.checkVisibility({ visibilityProperty: true }));
+return seen.map((part) => part.getAttribute("class"));
+"""
+OUTLINED = "return document.querySelector('.entries a[data-shown]')?.hash"
+
+
+def test_what_is_to_be_done_next_is_shown_in_the_picture(browser, small_study):
+    browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
+    browser.execute_script("document.querySelector('.fix a').click()")
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(OUTLINED) == "#entry-direction1")
+    assert sorted(browser.execute_script(MARKED)) == ["look shown", "turn shown"]
+    assert "alpha 6" in browser.execute_script("return document.querySelector('.chip').textContent")
+
+
+def test_an_entry_of_a_wrong_table_is_marked_in_both_arms(browser, small_study):
+    browser.get((small_study.folder / "reports/er3a_c60_article/validation.html").as_uri())
+    row = browser.find_element(By.CSS_SELECTOR, ".runs a[href='#cell-offset2']")
+    browser.execute_script("arguments[0].click()", row)
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(OUTLINED) == "#entry-offset2")
+    assert sorted(browser.execute_script(MARKED)) == ["mark right shown", "mark wrong shown"]

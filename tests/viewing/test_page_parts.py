@@ -16,7 +16,7 @@ from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.page.evidence_section import rounded_within
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.page import Head, Numbering, _tray_edges
+from er3a.pipeline.viewing.page import Head, Numbering
 from tests.conftest import ROOT
 
 CALL = re.compile(r"ui\.(picture|table)\((.*)\) \}\}")
@@ -70,14 +70,6 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
     alone = sum(each.status != "gauge" for each in stated)
     assert f"{wrong} of {alone} contradicted." in page
     assert json.loads((tmp_path / "marks.js").read_text().split(" = ")[1].rstrip(";\n"))[name]["validation"] == "fail"
-
-
-def test_a_box_that_may_be_placed_is_named_where_nothing_recommends_against_it():
-    study = load_study(ROOT / "config/config.yaml")
-    stored = SimpleNamespace(robot="er3a_c60", rests_on={"validation": "caution"})
-    assert _tray_edges(study, stored) == "200 × 150 × 50"
-    stored.rests_on["validation"] = "fail"
-    assert _tray_edges(study, stored) == ""
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,6 @@ LEVELS = words(
 TEXTS = texts(
     {
         "corrected": "corrected: {faults}",
-        "alike": "{faults} (or {more} others that fit alike)",
         "swapped_rows": "rows {first} and {second} are swapped",
         "swapped_limits": "limits of J{first} and J{second} are swapped",
         "shifted_rows": "{entries:entries} shifted {toward:toward} by one joint",

@@ -33,14 +33,13 @@ const chosen = () => named(location.hash.slice(1)) ?? named("tray-1");
 
 /** The middle of a layer, or the top of solids. */
 function placeOf({ points, shapes }) {
-  if (points) return scaled(points.reduce(add), 1 / points.length);
-  return add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
+  return points ? scaled(points.reduce(add), 1 / points.length) : add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
 }
 
-/** Turns the picture until what the address names is before the rest, and comes nearer. */
+/** Turns the picture until what the address names is before the rest; all stays in sight. */
 function face() {
   const [x, y] = subtract(placeOf(chosen()), middle);
-  Object.assign(space, { azimuth: Math.hypot(x, y) < 0.1 * size[0] ? data.azimuth : Math.atan2(y, x) + 0.35, distance: 0.8 * whole, elevation: 0.35 });
+  Object.assign(space, { azimuth: Math.hypot(x, y) < 0.1 * size[0] ? data.azimuth : Math.atan2(y, x) + 0.35, distance: whole, elevation: 0.35 });
   refresh();
 }
 
@@ -101,7 +100,7 @@ function draw() {
   for (const { name, parts } of all) for (const part of parts) part.visible = !left.has(name);
   for (const each of solids.filter(({ name }) => !left.has(name))) {
     const hiding = each.poses.length === 1 ? space.hiding(each.parts, solids[0].poses) : new Set();
-    space.place(each.parts, each.poses, new Map(), (part) => hiding.has(part) || (each.address && each !== shown));
+    space.place(each.parts, each.poses, new Map(), (part) => each !== shown && (each.address !== "" || hiding.has(part)));
   }
   for (const each of all.filter(({ name, address }) => address && !left.has(name)).sort((a, b) => (b === shown) - (a === shown))) {
     space.word(each.name, placeOf(each), each === shown ? space.page.accent : space.page.ink, each === shown);

@@ -113,22 +113,18 @@ def turning_figure(
 
 
 def _still(layers: Sequence[Layer], solids: Sequence[Solids], data: dict[str, Any]) -> Markup:
-    """The figure as it opens, for a page without WebGL; a body that is cut is its half behind the plane."""
+    """The figure for a page without WebGL: a body that can be cut is seen through."""
     low, high = np.array(data["box"]) / 1000
-    plane = low[1] + data["cut"] * (high[1] - low[1])
     length = FILLED * float(np.linalg.norm(high - low))
     picture = Still((low + high) / 2, length, data["azimuth"], data["elevation"])
     for each in solids:
         picture.solids(each.shapes, each.poses, {})
     for layer in sorted(layers, key=lambda layer: layer.cut):
         points = layer.points_mm / 1000
-        behind = ~(points[:, 1] < plane) | (not layer.cut)
         if layer.faces is not None:
-            picture.surface(
-                points, layer.faces[behind[layer.faces].all(axis=1)], layer.colour, 0.3 if layer.cut else 1.0
-            )
+            picture.surface(points, layer.faces, layer.colour, 0.3 if layer.cut else 1.0)
         else:
-            picture.points(points[behind], np.tile(rgb(layer.colour), (behind.sum(), 1)) / 255, layer.width)
+            picture.points(points, np.tile(rgb(layer.colour), (len(points), 1)) / 255, layer.width)
     return picture.markup()
 
 

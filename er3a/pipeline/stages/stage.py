@@ -36,7 +36,6 @@ class Stage:
     views : ``record`` (a recording, with its picture) and ``report`` (a page), as far as the stage has them
     rests_on : names of the stages whose verdict its pages say first
     shows : names of the stages whose results its page shows besides its own, as far as they are there
-    obstacles : whether it looks for collisions; its page then says that the workspace's tray is no obstacle
     motions : in plural and marked with ``N_``, what its motions are; the index compares them with the tray
     weighs : whether it looks at the masses of the arm's links
     may_run : whether the index says which of its motions may be run
@@ -53,7 +52,6 @@ class Stage:
     views: tuple[str, ...] = ("record", "report")
     rests_on: tuple[str, ...] = ()
     shows: tuple[str, ...] = ()
-    obstacles: bool = False
     motions: str = ""
     weighs: bool = False
     may_run: bool = False

@@ -33,9 +33,7 @@ export function beside(axis) {
 }
 
 /** `v` turned about a unit axis by the angle with cosine `c` and sine `s`: Rodrigues' formula [1]. */
-export function rotated(v, axis, c, s) {
-  return add(add(scaled(v, c), scaled(cross(axis, v), s)), scaled(axis, dot(axis, v) * (1 - c)));
-}
+export const rotated = (v, axis, c, s) => add(add(scaled(v, c), scaled(cross(axis, v), s)), scaled(axis, dot(axis, v) * (1 - c)));
 
 /** Angle that turns `start` to `end` about the unit axis, both projected across it. */
 export function signedAngle(start, end, axis) {

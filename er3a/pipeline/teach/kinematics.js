@@ -104,9 +104,7 @@ export function determinantFactors(T, { wrist_in_tool: wristInTool, to_axis_4: t
   };
 }
 
-function angleShortOfLine(a, b, axis) {
-  return Math.atan2(dot(axis, cross(a, b)), Math.abs(dot(a, b) - dot(a, axis) * dot(b, axis)));
-}
+const angleShortOfLine = (a, b, axis) => Math.atan2(dot(axis, cross(a, b)), Math.abs(dot(a, b) - dot(a, axis) * dot(b, axis)));
 
 /** The table's own frames, 0 (base) to m: those in which its rows are written; `T` are the joints' frames of `frames`. */
 export function tableFrames(table, T) {

@@ -73,9 +73,7 @@ function follow() {
 }
 
 /** The zero pose, or what the limits leave of it. */
-function startJoints() {
-  return JOINTS.map((k) => Math.min(table.upper[k], Math.max(table.lower[k], 0)));
-}
+const startJoints = () => JOINTS.map((k) => Math.min(table.upper[k], Math.max(table.lower[k], 0)));
 
 function showJoint(k) {
   const value = shown(table, k, q[k]);
@@ -196,7 +194,7 @@ function frame(now) {
   const T = frames(table, links, q);
   view.show(q, ghost, showRow(), clearance.show(T), byId("looks")?.value);
   showPose(T.at(-1));
-  showMeasures(data, T);
+  showMeasures(data, T, names.filter((_, k) => rows[k].dataset.state === "at").map((joint) => fill(words.joint_at_limit, { joint })));
   if (!listed) findSolutions(T.at(-1), now);
 }
 

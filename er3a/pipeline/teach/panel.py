@@ -68,6 +68,7 @@ WORDS: dict[str, Any] = {
     "endless_joint": N_("turns without end"),
     "room": N_("{room} to limit"),
     "at_limit": N_("at its limit"),
+    "joint_at_limit": N_("{joint} is at its limit."),
     "outside": N_("{joint} stays between {lower} and {upper}."),
     "no_number": N_("{joint} needs a number, in degrees."),
     "no_length": N_("{joint} needs a number, in millimetres."),
@@ -325,11 +326,8 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
 
 def _looked_at(robot: Robot) -> tuple[list[float], float]:
     """Where the picture's eye looks, (3,), m, and about how long the arm is from there, m."""
-    if robot.sliding.any() or robot.rows < 3:
-        tool = frames(robot, (robot.lower + robot.upper) / 2)[-1, :3, 3]
-        return ((robot.base[:3, 3] + tool) / 2).tolist(), 0.75 * drawn_size(robot)
-    origins = frames(robot, np.zeros(robot.joints))[1:, :3, 3]
-    return origins[0].tolist(), float(np.linalg.norm(np.diff(origins, axis=0), axis=1).sum())
+    tool = frames(robot, (robot.lower + robot.upper) / 2)[-1, :3, 3]
+    return ((robot.base[:3, 3] + tool) / 2).tolist(), 0.75 * drawn_size(robot)
 
 
 def singular_sets(robot: Robot) -> dict[str, Any] | None:

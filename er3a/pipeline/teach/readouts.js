@@ -27,23 +27,18 @@ export function showPose(T) {
   for (const [kind, texts] of Object.entries(forms)) byId(`orientation-${kind}`).querySelectorAll(".value").forEach((cell, i) => write(cell, texts[i]));
 }
 
-/** Writes the measures at frames `T`, and the warning that names what is near. */
-export function showMeasures(data, T) {
+/** Writes the measures at frames `T`, and the warning that names what is near; `tight` says which joints are at a limit. */
+export function showMeasures(data, T, tight) {
   const { words, near } = data;
   const measures = conditioning(data.table, T, data.characteristic_length);
   const singular = measures.conditionNumber === Infinity; // what is left of the values then is rounding
   write(byId("manipulability"), significant(singular ? 0 : measures.manipulability));
   write(byId("smallest"), significant(singular ? 0 : measures.smallestSingularValue));
   write(byId("condition"), significant(measures.conditionNumber));
-  if (!data.singular_sets) {
-    const value = measures.smallestSingularValue;
-    if (value < near.value) warn("near", fill(words.near_unnamed, { value: significant(value) }));
-    else warn("clear", words.clear);
-    return;
-  }
-  const factors = determinantFactors(T, data.singular_sets);
+  const factors = data.singular_sets ? determinantFactors(T, data.singular_sets) : {};
   const full = { wrist: Math.PI / 2, elbow: Math.PI / 2, shoulder: data.characteristic_length };
-  const texts = { at: [], near: [] };
+  const value = measures.smallestSingularValue;
+  const texts = { at: [], near: data.singular_sets || value >= near.value ? [] : [fill(words.near_unnamed, { value: significant(value) })] };
   for (const kind of Object.keys(factors)) {
     const distance = Math.abs(factors[kind]);
     const shown = SHOWN[kind](distance);
@@ -56,12 +51,8 @@ export function showMeasures(data, T) {
     row.querySelector(".fill").style.width = `${Math.min(100, (100 * distance) / full[kind])}%`;
     row.querySelector(".mark").style.left = `${(100 * near[kind]) / full[kind]}%`;
   }
-  const state = ["at", "near"].find((word) => texts[word].length) ?? "clear";
-  warn(state, [...texts.at, ...texts.near].join(" ") || words.clear);
-}
-
-function warn(state, text) {
+  texts.near.push(...tight);
   const warning = byId("warning");
-  warning.dataset.state = state;
-  write(warning, text);
+  warning.dataset.state = ["at", "near"].find((word) => texts[word].length) ?? "clear";
+  write(warning, [...texts.at, ...texts.near].join(" ") || words.clear);
 }

@@ -4,7 +4,6 @@ import { add, column, moved, scaled, turned } from "er3a/algebra";
 import { frames, tableFrames } from "er3a/kinematics";
 import { alongArm, Arm, ARM, Space, WORLD } from "er3a/space";
 
-
 export class ArmView extends Space {
   /** `draw` is called when the view has changed and the picture has to be drawn again. */
   constructor(canvas, data, links, draw) {

@@ -20,7 +20,7 @@ from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.answer import Group, ListRow, Mark
-from er3a.pipeline.viewing.side_view import UPRIGHT, Label, beyond, entry_places, flanges_off, seen_arm, side_view
+from er3a.pipeline.viewing.side_view import UPRIGHT, Label, beyond, entry_lines, flanges_off, seen_arm, side_view
 from er3a.robots.robot import Robot
 
 COLUMNS = {"a": "a (mm)", "alpha": "α (°)", "d": "d (mm)", "offset": N_("offset (°)"), "direction": N_("direction")}
@@ -88,13 +88,14 @@ def _keys(found: Comparison) -> list[tuple[str, str]]:
 
 def _seen(one: Robot, other: Robot, found: Comparison, rows: Sequence[Row]) -> Markup:
     """Both arms from the side; the lengths that differ named, and how far the flanges are from each other."""
-    same, places = found.verdict == "equal", entry_places(one)
+    same, lengths = found.verdict == "equal", [f"{column}{k + 1}" for k in range(one.rows) for column in "ad"]
+    places = entry_lines(one, lengths, np.zeros(one.joints))
     arms = [
-        seen_arm(other, own_title(other.title), "B", "right"),
+        seen_arm(other, own_title(other.title), "B"),
         seen_arm(one, own_title(one.title), "A", "right" if same else "wrong"),
     ]
     labels = [
-        Label(f"{column}{k} = {own} → {new}", places[f"{column}{k}"], "wrong")
+        Label(f"{column}{k} = {own} → {new}", places[f"{column}{k}"].mean(0), "wrong")
         for k, row in enumerate(rows, 1)
         for column, (own, new, differs) in zip(COLUMNS, row)
         if differs and column in ("a", "d")

@@ -12,13 +12,9 @@ function plain(text) {
   return candidate !== "" && Number.isFinite(Number(candidate)) ? candidate : text;
 }
 
-function numberIn(text) {
-  return text === "" ? NaN : Number(plain(text));
-}
+const numberIn = (text) => (text === "" ? NaN : Number(plain(text)));
 
-function textOf(cell) {
-  return (cell.innerText || cell.textContent).replace(/\s*\n\s*/g, " ").trim(); // what is folded has no inner text
-}
+const textOf = (cell) => (cell.innerText || cell.textContent).replace(/\s*\n\s*/g, " ").trim(); // what is folded has no inner text
 
 const NUMBER = /[+−-]?\d+(?:\u202f\d{3})*(?:\.\d+)?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|e[+−-]?\d+)?/u;
 const LEADING = new RegExp(`^(?:[^\\d:：=()（）.,;]{0,20}[:：=])?\\s*(?:${WORDS.bounds})?[^\\p{L}\\d+−-]*(${NUMBER.source})(?![\\p{L}\\d_.-])`, "u");
@@ -33,10 +29,7 @@ function valueOf(text) {
 
 // Where a verdict stands among all, the gravest first; -1 for a cell without one.
 const GRAVEST = ["fail", "conflict", "caution", "no_reference", "not_computed", "not_examined", "pass"];
-function gravity(cell) {
-  const shown = cell?.querySelector(".badge, .decision");
-  return GRAVEST.findIndex((status) => shown?.classList.contains(status));
-}
+const gravity = (cell) => GRAVEST.findIndex((status) => cell?.querySelector(".badge, .decision")?.classList.contains(status));
 
 // What each row of a column sorts by: if most cells with a number begin with it, that.
 function sortedBy(texts) {
@@ -771,3 +764,17 @@ addFinder();
 addEventListener("click", keepPlace, true);
 addEventListener("player", returnToPlace);
 returnToPlace();
+
+// What an entry of a table is of is marked in the picture: of the address, of what is to be done next, or under the pointer.
+const entryOf = (hash) => hash?.slice(1).replace(/^(cell|entry)-/, "") || null;
+const entryLinks = document.querySelectorAll(".runs a[href^='#cell-'], .grid .entries a");
+function showEntry(entry = entryOf(location.hash || document.querySelector(".fix a[href^='#cell-']")?.hash)) {
+  for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
+  for (const link of entryLinks) link.toggleAttribute("data-shown", entryOf(link.hash) === entry);
+}
+for (const link of entryLinks) {
+  link.addEventListener("pointerenter", () => showEntry(entryOf(link.hash)));
+  link.addEventListener("pointerleave", () => showEntry());
+}
+addEventListener("hashchange", () => showEntry());
+showEntry();

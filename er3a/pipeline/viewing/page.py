@@ -43,9 +43,9 @@ from er3a.pipeline.results import (
     read_status,
 )
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer
+from er3a.pipeline.viewing.conditions import condition_of
 from er3a.version import __version__
 
 if TYPE_CHECKING:
@@ -184,24 +184,14 @@ class ShownFigure:
         return measured(self.value, self.uncertainty, self.measure)
 
 
-NUMERICS = {  # key figures that answer no question of a verdict
-    "characteristic_length",
-    "power_balance",
-    "round_trip_joint_error",
-    "samples",
-    "worst_orientation_residual",
-    "worst_position_residual",
-}
-
-
 @dataclass(frozen=True)
 class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
     ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
     to know first.
-    ``checked``: each check, how much it covers, and why not all. ``assumed``: without a document. ``numerics``: figures
-    of the computation, not of the arm.
+    ``checked``: each check, how much it covers, and why not all. ``assumed``: without a document.
+    ``condition``: what of the table has to be confirmed; empty where that is not known.
     """
 
     robot: str
@@ -214,7 +204,7 @@ class Head:
     summary: Any
     checked: tuple[tuple[str, str, str], ...] = ()
     assumed: tuple[str, ...] = ()
-    numerics: tuple[ShownFigure, ...] = ()
+    condition: str = ""
 
     @property
     def no_verdict(self) -> bool:
@@ -300,13 +290,13 @@ def head_of(stored: Stored[Any]) -> Head:
         stage,
         verdict.status,
         text,
-        tuple(figure for figure in shown if figure.name not in NUMERICS),
+        shown,
         stored.provenance,
         caveats,
         summary,
         checked,
         tuple(map(assumed_text, summary.assumed)),
-        tuple(figure for figure in shown if figure.name in NUMERICS),
+        condition_of(stored.folder.parent / "validation") if stored.folder else "",
     )
 
 
@@ -433,9 +423,8 @@ def render_stage(
     if head.no_verdict:
         answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."))
         context["instead"] = alternative_table(study, stored)
-    box = _tray_edges(study, stored) if STAGES[stage].obstacles else ""
     template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
-    render(template, output, head.summary, answer=answer, never=never_text(stage), box=box, **framed | context)
+    render(template, output, head.summary, answer=answer, never=never_text(stage), **framed | context)
 
 
 def _framed(study: Study, stored: Stored[Any]) -> dict[str, Any]:
@@ -457,14 +446,6 @@ def robots_with(study: Study, page: str) -> list[tuple[str, str, str]]:
         for name in study.names
         if page in study.pages(name)
     ]
-
-
-def _tray_edges(study: Study, stored: Stored[Any]) -> str:
-    """The edges (mm) of the tray that the workspace page may place, which no other stage takes for an obstacle;
-    empty where no place is asked for or recommended."""
-    if "workspace" not in study.stages(stored.robot) or stored.rests_on.get("validation") == "fail":
-        return ""
-    return " × ".join(f"{edge:g}" for edge in study.section(CapabilitySettings).placement.box_mm)
 
 
 BRACKETS = re.compile(r"(?<=>)(?<!<code>)([^<>()]{1,40}) \(([^<>()]{1,20})\)(?=</t[hd]>)")
@@ -644,4 +625,4 @@ def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> 
     """
     framed = _framed(study, stored)
     answer = Answer(tr("Not computed."), below=framed["head"].own_text)
-    render(_HERE / "absent.html.j2", output, answer=answer, never="", box="", **framed)
+    render(_HERE / "absent.html.j2", output, answer=answer, never="", **framed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,13 +21,21 @@ Kind = Literal["right", "wrong"]
 LabelKind = Literal["wrong", "open", "hole", "right", "sound", "floor"]
 MARGIN = 0.06  # of the larger side
 UPRIGHT = 0.83  # width of a drawing, of its height
-LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
-LETTERS = 0.021  # of the height: of a joint's name at its arrow
+LABEL, SCALE = 0.38, 0.05  # of the height: room for labels at the right, for the scale below
+LETTERS = 0.021  # of the height: of a line's word
+SIDES = np.array(
+    [(0, 1.4), (1.9, 0), (0, -1.4)]
+)  # of these, from a line to its word: not to the left, where the drawing ends
+BETWEEN = 20  # points of a link that words keep off
 GAP = 0.045  # of the height, between two labels
 TICK = 0.02  # of a dimension, half of what ends it
 COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
 SEEN_MM = 2.0  # by which two arms differ in a drawing
 ON_AXIS_MM = 1e-6
+# From where to where an entry of a row is seen, in shares of its way along its axis and of that to the next one.
+AT_JOINT = ((0.5, 0.0), (0.5, 0.0))
+SEEN_AT = {"d": ((0.0, 0.0), (1.0, 0.0)), "a": ((1.0, 0.0), (1.0, 1.0))}
+SEEN_AT |= dict.fromkeys(("alpha", "beta", "offset"), ((1.0, 0.0), (1.0, 0.0)))
 BONE, THINNER = 0.045, 0.6  # an arm's thickness, of the height of what is drawn, and a wrong arm's of that over another
 THICKEST = 0.13  # of the arm's own extent
 SCALES_MM = (100, 200, 500, 1000, 2000)
@@ -61,7 +69,7 @@ class Label:
 
     Attributes
     ----------
-    name : by which an address on the page leads to it
+    name : by which an address on the page leads to it, or the entry of the table that it is of
     start : (2,), mm, from where a dashed line leads to the place; None for none
     written_there : at its place, though others are in a column
     """
@@ -74,20 +82,35 @@ class Label:
     written_there: bool = False
 
 
-def seen_arm(robot: Robot, title: str, note: str, kind: Kind, reach_mm: Sequence[Reals] = ()) -> SeenArm:
-    """An arm with all joints at 0, seen along y of the frame that its base is placed in."""
-    return SeenArm(title, note, kind, skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000, reach_mm)
+@dataclass(frozen=True, eq=False)
+class DrawnLine:
+    """A line over the arms: points (k, 2), mm, the class of its look, the entry of the table that it is of, and a word
+    near it, where there is room."""
+
+    points: Reals
+    look: str
+    entry: str = ""
+    word: str = ""
 
 
-def entry_places(robot: Robot) -> dict[str, Reals]:
-    """Where each entry of geometry is seen with all joints at 0 (2,), mm: a length at its middle, an angle at its
-    joint; by names such as ``d4``."""
-    parts, T = link_parts(robot), frames(robot, np.zeros(robot.joints))
-    found = {}
-    for row in range(1, robot.rows + 1):
-        along, across = parts[row, ALONG_Z, :3, 3], parts[row, TO_NEXT_AXIS, :3, 3]
-        for name, local in {"d": along / 2, "a": along + across / 2, "": along}.items():
-            found[f"{name}{row}"] = 1000 * (T[row - 1] @ [*local, 1.0])[[0, 2]]
+def seen_arm(
+    robot: Robot, title: str, note: str, kind: Kind = "right", reach_mm: Sequence[Reals] = (), q: Reals | None = None
+) -> SeenArm:
+    """An arm at joint values (n,), rad or m, or else with all joints at 0, seen along y of the frame that its base is
+    placed in."""
+    q = np.zeros(robot.joints) if q is None else q
+    return SeenArm(title, note, kind, skeleton(robot, q)[:, ::2] * 1000, reach_mm)
+
+
+def entry_lines(robot: Robot, entries: Iterable[str], q: Reals) -> dict[str, Reals]:
+    """From where to where entries such as ``d4`` are seen (2, 2), mm, at joint values (n,), rad or m: a length along
+    its link, an angle at the end of its row, all else at the middle of its axis."""
+    parts, T, found = link_parts(robot), frames(robot, q), {}
+    for entry in entries:
+        column = entry.rstrip("0123456789")
+        row = int(entry.removeprefix(column))
+        local = SEEN_AT.get(column, AT_JOINT) @ parts[row, [ALONG_Z, TO_NEXT_AXIS], :3, 3]
+        found[entry] = 1000 * (local @ T[row - 1, :3, :3].T + T[row - 1, :3, 3])[:, ::2]
     return found
 
 
@@ -99,13 +122,13 @@ def flanges_off(arms: Sequence[SeenArm]) -> list[Label]:
     return [Label(off, right, "wrong", start=wrong)] if far > SEEN_MM else []
 
 
-def dimension(far: float, low: float, high: float, kind: LabelKind) -> list[tuple[str, Reals]]:
+def dimension(far: float, low: float, high: float, kind: LabelKind) -> list[DrawnLine]:
     """A dimension at the height ``low``, from axis 1 to ``far`` in front of it, with a tick at both ends, and a dashed
     line from its end up to ``high``; all in mm. As ``over`` of :func:`side_view` takes it."""
     tick = TICK * far
-    ends = [(x, low + side * tick) for x, sides in ((0.0, (-1, 1, 0)), (far, (0, 1, -1))) for side in sides]
+    ends = np.array([(0.0, low + tick), (0.0, low - tick), (0.0, low), (far, low), (far, low - tick)])
     upwards = np.array([(far, low), (far, high)])
-    return [(f"dimension {kind}", np.array(ends)), (f"dimension far {kind}", upwards)]
+    return [DrawnLine(ends, f"dimension {kind}"), DrawnLine(upwards, f"dimension far {kind}")]
 
 
 def beyond(arms: Sequence[SeenArm]) -> float:
@@ -127,7 +150,7 @@ def side_view(
     ratio: float,
     labels: Sequence[Label] = (),
     column_mm: float | None = None,
-    over: Sequence[tuple[str, Reals]] = (),
+    over: Sequence[DrawnLine] = (),
 ) -> Markup:
     """The drawing as HTML: an SVG, and over it words that are as large as the page's.
 
@@ -138,14 +161,13 @@ def side_view(
     ratio : width of the drawing, of its height
     labels : moved up or down where they would be on each other
     column_mm : how far forward all labels begin, each with a line to its place; None for labels at their places
-    over : lines over the arms: kind, and points (k, 2), mm; an arrow that a joint turns by (``turn J1``) has its name
-        at its upper left
+    over : lines over the arms
 
     Returns
     -------
     drawing : colours come from the page's style sheet
     """
-    corners = np.concatenate([_corners(arms), *(line for _, line in over)])
+    corners = np.concatenate([_corners(arms), *(line.points for line in over)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
     low, high = low - margin, high + margin
@@ -167,7 +189,7 @@ def side_view(
     parts += [_lead(label, place) for label, place in placed]
     thick = min(BONE * tall, THICKEST * float(np.ptp(arms[0].points_mm, axis=0).max()))
     parts += [_arm(arm, thick * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
-    parts += [_over(kind, points, LETTERS * tall) for kind, points in over]
+    parts += _over(arms, over, LETTERS * tall)
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
         low[0], -high[1], wide, tall, said, Markup("").join(parts)
@@ -182,11 +204,22 @@ def side_view(
     )
 
 
-def _over(kind: str, points: Reals, letters: float) -> Markup:
-    x, z = points[:, 0].min() - letters / 2, points[:, 1].max() + letters / 3  # clear of joints, its own and the next
-    name = Markup('<text x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(x, -z, letters, kind[5:])
-    line = Markup('<polyline class="{}" points="{}"/>').format(kind, _line(points))
-    return line + name if kind.startswith("turn ") else line
+def _over(arms: Sequence[SeenArm], lines: Sequence[DrawnLine], letters: float) -> list[Markup]:
+    """Lines, and the word of each on that side of it which is farthest from arms and the words of those before it."""
+    taken = [np.linspace(arm.points_mm[:-1], arm.points_mm[1:], BETWEEN).reshape(-1, 2) for arm in arms]
+    found = []
+    for line in lines:
+        drawn = Markup('<polyline points="{}"/>').format(_line(line.points))
+        if line.word:
+            low, high = line.points.min(axis=0), line.points.max(axis=0)
+            places = (low + high) / 2 + letters * SIDES + np.sign(SIDES) * (high - low) / 2
+            others = np.concatenate(taken)
+            at = max(places, key=lambda place: np.linalg.norm(others - place, axis=1).min())
+            taken.append(at[None])
+            word = '<text x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>'
+            drawn += Markup(word).format(at[0], letters / 3 - at[1], letters, line.word)
+        found.append(Markup('<g class="{}" data-entry="{}">{}</g>').format(line.look, line.entry, drawn))
+    return found
 
 
 def _name(arm: SeenArm) -> Markup:
@@ -219,10 +252,9 @@ def _lead(label: Label, place: Reals) -> Markup:
 
 def _word(label: Label, share: Reals) -> Markup:
     """A label, at its place in parts of the drawing."""
-    name = Markup(' id="{}"').format(label.name) if label.name else ""
-    return Markup('<span class="label {}{}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
-        label.kind, " there" if label.written_there else "", name, *(100 * share), label.text
-    )
+    word = '<span class="label {}{}" data-entry="{}" style="left: {:.1f}%; bottom: {:.1f}%">{}</span>'
+    there = " there" if label.written_there else ""
+    return Markup(word).format(label.kind, there, label.name, *(100 * share), label.text)
 
 
 def _line(points: Reals) -> str:

@@ -33,7 +33,7 @@ SIDES, BELTS, GRID_STEPS = 40, 10, 8
 PIECES = 32  # of a line of the grid: painting looks at all that is in the rectangle around each
 NEARER = 1.002  # a line is painted as if it were nearer, so that the surface that it lies on does not cut it
 LETTER = 17  # px, height of words
-PLACES = ((0, -1), (0, 1), (0.7, 0), (-0.7, 0), (0, -2), (0, 2), (0.7, -1), (-0.7, 1), (0, -3), (0, 3))
+PLACES = ((0, -1), (0, 1), (0.7, 0), (-0.7, 0))
 """Where a word may be, in its widths and heights from its point, the best place first."""
 FLAT = N_("This browser has no WebGL: the picture shows how the page opened.")
 QUALITY = 80  # of the WebP file

@@ -45,5 +45,4 @@ STAGE = Stage(
     inputs=_inputs,
     rests_on=("validation",),
     shows=("trajectory",),
-    obstacles=True,
 )

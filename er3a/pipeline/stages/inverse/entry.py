@@ -38,5 +38,4 @@ STAGE = Stage(
     settings={"inverse": InverseSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
-    obstacles=True,
 )

@@ -27,7 +27,6 @@ STAGE = Stage(
     is_configured=lambda study, robot: study.entry(robot).programs is not None,
     rests_on=("validation",),
     shows=("workspace", "trajectory", "vision"),
-    obstacles=True,
     motions=N_("programs"),
     may_run=True,
 )

@@ -32,7 +32,6 @@ STAGE = Stage(
     inputs=_inputs,
     rests_on=("validation",),
     shows=("workspace", "programs", "vision"),
-    obstacles=True,
     motions=N_("paths"),
     may_run=True,
 )

@@ -91,6 +91,5 @@ STAGE = Stage(
     inputs=_inputs,
     is_configured=lambda study, robot: study.entry(robot).vision is not None,
     rests_on=("validation",),
-    obstacles=True,
     motions=N_("grasps"),
 )

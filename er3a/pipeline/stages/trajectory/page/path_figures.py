@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from matplotlib.axes import Axes
 
@@ -15,8 +15,8 @@ from er3a.pipeline.viewing import palette
 from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture
 
-WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show
-EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
+WIDTHS = 3.2, 0.83  # of the first curve, and of each in parts of the one before, so that those that coincide all show
+KEY: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.1, "handlelength": 1.2}
 OFF = 0.005  # mm or deg, from which on a repair counts as off the path
 
 
@@ -25,7 +25,13 @@ def path_picture(path: model.PathSummary, rows: model.PathChecks, alt: str, capt
     figure, axes = new_figure(rows=2, width=9.6, height=5.2, sharex=True)
     for ax, name in zip(axes, ("q_deg", "q_deg_s")):
         for j, values in enumerate(getattr(rows, name).T):
-            ax.plot(rows.t_s, values, color=palette.JOINTS[j], linewidth=WIDTHS[j], label=palette.JOINT_NAMES[j])
+            ax.plot(
+                rows.t_s,
+                values,
+                color=palette.JOINTS[j],
+                linewidth=WIDTHS[0] * WIDTHS[1] ** j,
+                label=palette.JOINT_NAMES[j],
+            )
         _mark(ax, path)
         ax.set_ylabel(axis_label(rows, name))
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
@@ -58,7 +64,7 @@ def nearness_picture(
         margin = shapes.margin_mm
         text = tr("assumed shapes may be off by {mm:g} mm", mm=margin)
         ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.25, linewidth=0, label=text)
-        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, handlelength=1.2)
+        ax.legend(**KEY)
     far, at = fixed(least.least_mm, 1), fixed(least.t_s, 2)
     ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
     caption = tr("Least: {far} mm at {t} s, {pair}.", far=far, t=at, pair=say(least.between))
@@ -94,7 +100,7 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
             linewidth=0,
             label=tr("off the path") if off.any() else None,
         )
-        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, handlelength=1.2, ncols=2)
+        ax.legend(ncols=2, **KEY)
     else:
         _mark(ax, path)
     ax.plot(rows.t_s, getattr(rows, column), color=palette.MODEL, linewidth=2.2)
@@ -121,7 +127,7 @@ def _mark(ax: Axes, path: model.PathSummary) -> None:
         for part in stretches:
             ax.axvspan(part.t0_s, part.t1_s, color=colour, alpha=alpha, linewidth=0)
     for event in path.singularities:
-        ax.axvline(event.t_s, color=palette.HIGHLIGHT, linestyle=EVENT_STYLES[event.crossing], linewidth=1.4)
+        ax.axvline(event.t_s, color=palette.HIGHLIGHT, linestyle="-" if event.crossing else ":", linewidth=1.4)
         at = (event.t_s, 1.0)
         ax.plot(
             *at, "v", color=palette.HIGHLIGHT, markersize=6, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5

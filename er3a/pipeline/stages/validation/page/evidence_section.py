@@ -21,6 +21,7 @@ from er3a.pipeline.viewing.answer import ListRow
 from er3a.pipeline.viewing.page import panel_link
 from er3a.references.quantities import MM
 from er3a.references.reference import NO_DOCUMENT
+from er3a.references.seen import TOWARD
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -91,6 +92,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         open_columns=OPEN_COLUMNS,
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
+        looks=[each for each in evidence.proposals if each.params.get("seen") in TOWARD],
         first=first if evidence.contradicted else to_confirm(evidence),
     )
 

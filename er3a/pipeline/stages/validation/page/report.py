@@ -13,9 +13,9 @@ from markupsafe import Markup
 
 from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
-from er3a.finding import is_one
+from er3a.finding import Finding, is_one
 from er3a.identifiability.entries import column_of
-from er3a.kinematics.forward import frames
+from er3a.kinematics.forward import frames, skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr, unit_sign, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
@@ -43,28 +43,36 @@ from er3a.pipeline.viewing.page import (
     text_address,
 )
 from er3a.pipeline.viewing.side_view import (
-    COLUMN,
     UPRIGHT,
+    DrawnLine,
     Label,
     LabelKind,
+    SeenArm,
     beyond,
     dimension,
-    entry_places,
+    entry_lines,
     flanges_off,
     seen_arm,
     side_view,
 )
+from er3a.references.predict import REACH_STARTS, search
+from er3a.references.quantities import AxisDistance
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 ANGLES = ("alpha", "beta", "offset")
-AROUND = np.radians(np.linspace(-125.0, 125.0, 31))  # of an arrow around an axis: open at the back
-SEEN_FROM_SIDE = 0.64  # of that: the half before an axis in the drawing's plane
+AROUND = np.radians(np.linspace(-110.0, 110.0, 31))  # of an arrow around an axis: open at the back
 HEAD = 0.5  # of its radius, the length of its head
 TILT = 0.35  # of a circle around an axis in the drawing's plane, seen a little from above
 RADIUS = 0.045  # of such an arrow, of the size of the arm
-BELOW = 0.1  # of a reach: from one line to the next below the base
+BELOW = 0.15  # of a reach: from one line to the next below the base
 LABELLED = 5  # of the lengths that are wrong, at most, so that words have room
-SEEN = "seen"  # address in the picture of what is to be done next
+JOG = np.radians(30.0)  # of a joint that one looks at
+VIEWS = {  # which of x, y and z are to the right and upwards for one who looks from there, and their signs
+    N_("from behind"): ([1, 2], [-1, 1]),
+    N_("from the side"): ([0, 2], [1, 1]),
+    N_("from above"): ([1, 0], [-1, 1]),
+}
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
     N_("Check"),
@@ -80,19 +88,14 @@ Judged = model.Judged
 
 
 def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
-    """A row for each set and group."""
-    rows, sets = [], dict[str, list[Judged]]()
+    """A row for each set and group: how many checks pass, fail, and contradict each other."""
+    counted = dict[tuple[str, str], Counter[str]]()
     for check in checks:
-        sets.setdefault(check.reference_set or tr("the model itself"), []).append(check)
-    for title, own in sets.items():
-        for group in dict.fromkeys(check.group for check in own):
-            part = [check for check in own if check.group == group]
-            counted = Counter(check.status for check in part)
-            worst = max(part, key=lambda check: check.tolerances_off)
-            off = with_unit(_value(worst.difference, worst), worst.unit)
-            counts = counted["pass"], counted["fail"], counted["conflict"]
-            rows.append([title, word("group", GROUPS, group), *counts, say(worst.subject), off])
-    return rows
+        counted.setdefault((check.reference_set or tr("the model itself"), check.group), Counter())[check.status] += 1
+    return [
+        [title, word("group", GROUPS, group), *(counts[status] for status in ("pass", "fail", "conflict"))]
+        for (title, group), counts in counted.items()
+    ]
 
 
 def check_row(check: Judged) -> list[str]:
@@ -156,79 +159,84 @@ def _both_arms(
     robot: Robot, other: Robot | None, evidence: Mapping[str, Any], disputed: Sequence[model.Conflict]
 ) -> Markup:
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
-    scale."""
-    arms = [seen_arm(robot, tr("This table"), "", "right")]
+    scale.
+
+    The lengths that evidence contradicts most are named, and the angles that it leaves open. Where each entry is seen
+    is marked while it is asked for, with what the other arm has instead. Where documents contradict each other about a
+    reach, the arm is stretched, and what each states is a dimension from axis 1 on below it, with its source; that of
+    the table in its colour."""
+    q = np.zeros(robot.joints)
+    for each in disputed[:1]:
+        q = search(robot, AxisDistance(**each.subject.params), REACH_STARTS)[1]
+    arms = [seen_arm(robot, tr("This table"), tr("stretched") if disputed else "", q=q)]
     if other is not None:
-        arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
+        arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), q=q))
     off = flanges_off(arms)
     arms = [arms[0], replace(arms[-1], kind="wrong")] if off else arms[-1:]
-    reaches, dimensions = _dimensions(disputed)
-    labels = [*_entries_seen(robot, evidence), *off, *reaches]
-    column = max([beyond(arms), *((1 + COLUMN) * each.measured for each in disputed)])
-    places, over = entry_places(robot), []
-    radius = RADIUS * float(np.ptp(arms[-1].points_mm, axis=0).max())
-    for joint, cells in evidence.get("rows", ()):
-        if any(cell and column_of(cell["entry"]) == "direction" and _kind(cell["status"]) == "open" for cell in cells):
-            over.append(_turn_arrow(robot, joint, places[f"d{joint}"], radius))
-    return side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=column, over=[*over, *dimensions])
+    own = arms[-1]
+    labels, over = list[Label](), list[DrawnLine]()
+    for each in disputed:
+        step = BELOW * each.measured
+        for row, stated in enumerate(each.statements, 1):
+            kind: LabelKind = "right" if stated.met else "open"
+            text = joined([with_unit(fixed(stated.expected, 1), each.unit), own_title(stated.document)], ": ")
+            labels.append(Label(text, np.array([0.0, -step * row]), kind, "seen", written_there=True))
+            over += dimension(stated.expected, -step * (row + 0.5), own.points_mm[-1, 1], kind)
+    cells = {cell["entry"]: cell for _, row in evidence.get("rows", ()) for cell in row if cell}
+    lines, right = entry_lines(robot, cells, q), entry_lines(other, cells, q) if off and other else {}
+    worst = [row.address for row in evidence.get("first", ())[:LABELLED]]
+    radius = RADIUS * float(np.ptp(own.points_mm, axis=0).max())
+    for entry, cell in cells.items():
+        column, kind, gives = column_of(entry), _kind(cell["status"]), cell["gives"]
+        if column == "direction" and kind == "open":
+            over.append(_turn_arrow(robot, q, entry, lines[entry][0], radius))
+            continue
+        angle = column in ANGLES
+        if cell["status"] == "open" if angle else column in "ad" and f"#cell-{entry}" in worst:
+            said = with_unit(
+                joined([cell["value"], gives], " → " if kind == "wrong" else tr(" or ")), "deg" if angle else "mm"
+            )
+            text = f"{entry_word(entry)}: {said}{'?' * (kind == 'open')}"
+            labels.append(Label(text, lines[entry].mean(0), kind, entry))
+        over.append(DrawnLine(lines[entry], f"mark {own.kind}", entry))
+        if entry in right:
+            over.append(DrawnLine(right[entry], "mark right", entry, gives or cell["value"]))
+    labels += off
+    drawn = side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=beyond(arms), over=over)
+    return drawn + Markup("").join(_look(robot, each) for each in evidence.get("looks", ()))
 
 
-def _turn_arrow(robot: Robot, joint: int, at: Reals, radius: float) -> tuple[str, Reals]:
+def _look(robot: Robot, found: Finding) -> Markup:
+    """Where the arm goes when a joint is jogged, and where it would if its direction were the other, seen from where
+    the flange is farthest off."""
+    q, jog = meant(robot, found.pose_deg), JOG * np.eye(robot.joints)[found.joint - 1]
+    right, wrong = (1000 * skeleton(robot, each) for each in (q + jog, q - jog))
+    side = max(VIEWS, key=lambda each: np.linalg.norm((right - wrong)[-1, VIEWS[each][0]]))
+    axes, signs = VIEWS[side]
+    arms = [
+        SeenArm(tr("direction{joint} is right", joint=found.joint), "", "right", right[:, axes] * signs),
+        SeenArm(tr("turn its sign"), "", "wrong", wrong[:, axes] * signs),
+    ]
+    title = tr("+J{joint}, {side}", joint=found.joint, side=tr(side))
+    return Markup('<div class="look" data-entry="{}"><b>{}</b>{}</div>').format(
+        found.entry, title, side_view(arms, ratio=1.0)
+    )
+
+
+def _turn_arrow(robot: Robot, q: Reals, entry: str, at: Reals, radius: float) -> DrawnLine:
     """An arrow about a place (2,), mm, as an axis turns with its joint's value: before an axis in the drawing's
-    plane, over one across it."""
-    axis = robot.direction[joint - 1] * frames(robot, np.zeros(robot.joints))[joint - 1, :3, 2]
+    plane, over one across it; the arm is at joint values (n,), rad or m."""
+    joint = int(entry.removeprefix("direction"))
+    axis = robot.direction[joint - 1] * frames(robot, q)[joint - 1, :3, 2]
     across = abs(axis[1]) > np.sqrt(0.5)
-    first, around = ([0.0, 0.0, 1.0], AROUND) if across else ([0.0, -1.0, 0.0], SEEN_FROM_SIDE * AROUND)
-    ring = np.outer(np.cos(around), first) + np.outer(np.sin(around), np.cross(axis, first))
+    first = [0.0, 0.0, 1.0] if across else [0.0, -1.0, 0.0]
+    ring = np.outer(np.cos(AROUND), first) + np.outer(np.sin(AROUND), np.cross(axis, first))
     seen = ring[:, ::2] + TILT * ring[:, 1:2] * np.abs(axis[::2])
     tip, back = seen[-1], seen[-3] - seen[-1]
     back *= HEAD / np.linalg.norm(back)
     wide = back[::-1] * [-0.7, 0.7]
-    return f"turn J{joint}", at + radius * np.stack([*seen, tip + back + wide, tip, tip + back - wide])
-
-
-def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[tuple[str, Reals]]]:
-    """What documents contradict each other about: each reach that one states as a dimension of its own, below the base,
-    from axis 1 on; that of the table in its colour.
-
-    Returns
-    -------
-    labels, lines : what is measured, then each value with its source, each over its line
-    """
-    labels, lines = [], []
-    for each in disputed:
-        step = BELOW * each.measured
-        labels.append(Label(say(each.subject), np.array([0.0, -step]), "open", SEEN, written_there=True))
-        for row, stated in enumerate(each.statements, 2):
-            kind: LabelKind = "right" if stated.met else "open"
-            text = joined([with_unit(fixed(stated.expected, 1), each.unit), own_title(stated.document)], ": ")
-            labels.append(Label(text, np.array([0.0, -step * row]), kind, written_there=True))
-            lines += dimension(stated.expected, -step * (row + 0.5), 0.0, kind)[:1]
-    return labels, lines
-
-
-def _difference(disputed: model.Conflict) -> str:
-    """By how much documents contradict each other about a reach."""
-    values = [stated.expected for stated in disputed.statements]
-    return tr("{far} of difference", far=with_unit(fixed(max(values) - min(values), 1), disputed.unit))
-
-
-def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
-    """The lengths that evidence contradicts most, and the angles that it leaves open, each at the link or joint that it
-    is of; what is settled is in the table."""
-    places, found = entry_places(robot), []
-    worst = [row.address for row in evidence.get("first", ())[:LABELLED]]
-    for joint, cells in evidence.get("rows", ()):
-        for cell in filter(None, cells):
-            entry = cell["entry"]
-            angle = column_of(entry) in ANGLES
-            if cell["status"] == "open" if angle else column_of(entry) in ("a", "d") and f"#cell-{entry}" in worst:
-                kind, gives = _kind(cell["status"]), cell["gives"]
-                values = joined([cell["value"], gives], " → " if kind == "wrong" else tr(" or "))
-                text = f"{entry_word(entry)}: {with_unit(values, 'deg' if angle else 'mm')}"
-                text += "?" if kind == "open" else ""
-                found.append(Label(text, places.get(entry, places[str(joint)]), kind))
-    return found
+    arrow = at + radius * np.stack([*seen, tip + back + wide, tip, tip + back - wide])
+    return DrawnLine(arrow, "turn", entry, f"J{joint}")
 
 
 def _kind(status: str) -> LabelKind:
@@ -251,18 +259,20 @@ def _answer(
         keys.append((f"{count}/{alone}", what))
         if unsure and not bad:
             below = tr("{count} entries may be wrong unnoticed.", count=unsure)
+    values = [stated.expected for each in disputed[:1] for stated in each.statements]
     if disputed:
-        keys[0] = _difference(disputed[0]), tr("between documents")
+        off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)
+        keys[0] = tr("{far} of difference", far=off), tr("between documents")
     if instead:
         fix = Fix(
             tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),
             f"../{instead}/validation.html",
         )
     elif disputed:
-        stated = joined([fixed(each.expected, 1) for each in disputed[0].statements], " or ")
+        stated = joined([fixed(value, 1) for value in values], " or ")
         fix = Fix(
             tr("measure the {subject}: {values} mm?", subject=say(disputed[0].subject), values=stated),
-            f"#{SEEN}",
+            "#seen",
             instead=False,
         )
     elif is_one(found, "validation.left_open") and found.next_measurement:
