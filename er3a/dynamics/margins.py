@@ -40,7 +40,8 @@ from er3a.robots.robot import Grade, Robot
 
 Binding = Literal["peak", "rms", "speed"]
 REAL = 1e-7
-"""A root of a polynomial is real if its imaginary part is less, in parts of its size."""
+"""A root of a polynomial is real if its imaginary part is less, in parts of its size;
+whether the polynomial rises at it is asked so far beyond."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +132,8 @@ def _by_rms(squares: list[Reals], rated: Reals) -> Reals:
         polynomial = np.array([part[joint] for part in squares])
         polynomial[-1] -= rated[joint] ** 2
         roots = np.roots(polynomial)
-        real = np.sort(roots.real[(np.abs(roots.imag) <= REAL * np.abs(roots)) & (roots.real > 0)])
-        rising = real[np.polyval(polynomial, real * (1 + REAL)) > 0]
+        real = np.sort(roots.real[(np.abs(roots.imag) <= REAL * np.abs(roots)) & (roots.real >= 0)])
+        rising = real[np.polyval(polynomial, real + REAL) > 0]
         found[joint] = 0.0 if polynomial[-1] > 0 else rising[0] if len(rising) else np.inf
     return found
 

@@ -342,6 +342,7 @@ def test_way_points_become_a_path_file_and_a_program_that_er3a_reads(panel, tmp_
     panel.open()
     assert len(panel.browser.find_elements(By.CSS_SELECTOR, "#points li")) == 2
     panel.one("#clear-points").click()
+    assert not panel.browser.find_elements(By.CSS_SELECTOR, "#points li")
     assert panel.clean()
 
 

@@ -173,14 +173,18 @@ def test_a_slip_is_named_where_base_or_flange_take_up_the_turn_of_a_slide(slide,
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("slide", "entry"), [(False, "alpha3"), (True, "beta3")])
-def test_a_lean_of_the_next_axis_is_a_twist_unless_that_takes_two_entries(slide, entry):
+@pytest.mark.parametrize(("convention", "row"), [("standard", 3), ("modified", 4)])
+@pytest.mark.parametrize(("slide", "column"), [(False, "alpha"), (True, "beta")])
+def test_a_lean_of_the_next_axis_is_a_twist_unless_that_takes_two_entries(slide, column, convention, row):
     """Of coincident axes alpha will do with other zeros of both; a slide's theta is an entry of its own."""
     on_axis = ("P", 0, 0, 0, 0, 300) if slide else ("R", 0, 0, 200, -150, 150)
     others = [("R", a, 90, d, -150, 150) for a, d in ((0, 100), (100, 0), (0, 50), (80, 0))]
-    right = made_of([*others[:2], on_axis, *others[2:]])
-    found = er3a.compare(right, right.replace(beta=np.radians([0, 0, 2, 0, 0])))
-    assert [(each.entry, each.a, each.b) for each in found.geometry.differences] == [(entry, 0, pytest.approx(2))]
+    arm = made_of([*others[:2], on_axis, *others[2:]])
+    right = arm.replace(convention=convention, a=np.roll(arm.a, row - 3), alpha=np.roll(arm.alpha, row - 3))
+    found = er3a.compare(right, right.replace(beta=np.radians(2) * (np.arange(1, 6) == row)))
+    assert [(each.entry, each.a, each.b) for each in found.geometry.differences] == [
+        (f"{column}{row}", 0, pytest.approx(2))
+    ]
 
 
 @pytest.mark.parametrize("row", [0, 3, 4])

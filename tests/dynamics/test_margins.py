@@ -128,8 +128,10 @@ def test_an_arm_that_cannot_stand_has_no_margin_and_unknown_limits_none(arm):
 )
 def test_the_greatest_speed_scale_is_where_a_torque_leaves_its_limits(at_rest, linear, square, expected):
     parts = [np.full((2, 1), part) for part in (at_rest, linear, square)]
-    one = DriveLimits(np.ones(1), np.full(1, np.nan), np.full(1, np.nan))
-    assert max_speed_scale(np.array([0.0, 1.0]), parts, np.zeros((2, 1)), one).value == pytest.approx(expected)
+    one, unknown = np.ones(1), UNKNOWN[:1]
+    for drive in (limits(one, unknown, unknown), limits(unknown, one, unknown)):
+        found = max_speed_scale(np.array([0.0, 1.0]), parts, np.zeros((2, 1)), drive)
+        assert found.value == pytest.approx(expected)
 
 
 def test_rated_torques_bound_payload_and_speed_by_the_effective_ones(arm):

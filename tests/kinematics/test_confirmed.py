@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from er3a.geometry.transforms import transform
 from er3a.geometry.vectors import wrap_to_pi
+from er3a.kinematics import by_class
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import arm_solver, with_task_frame
 from er3a.kinematics.inverse import inverse
@@ -53,6 +55,8 @@ def test_straight_and_folded_arms_meet_the_pose_and_have_the_own_joints(forearm,
         assert np.abs(wrap_to_pi(rows - q)).max(axis=1).min() < 1e-6
         single = inverse(robot, T, q)
         assert misses(robot, single.q, T).max() < 1e-12
+        away = transform(random.normal(size=3), np.zeros(3))
+        assert by_class.misses(robot, away @ T, q)[0] == pytest.approx(np.linalg.norm(away[:3, 3]))
     for motion in single.families:
         assert misses(robot, motion.members(np.linspace(*motion.range, 9)), T).max() < 1e-9
 
