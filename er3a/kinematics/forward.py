@@ -20,6 +20,7 @@ Row = tuple[float, float, float, float]
 
 BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
 _SIGN, _START, _SLIDES = 0, 1, 2  # rows of the kernels' ``joint``
+CONFIRMS = 1e-9  # m and rad by which a row may miss what is asked: far above the rounding of a closed form
 _COS, _SIN = 12, 13  # rows of scratch memory after the 3 x 4 entries of a block of poses
 SCRATCH = 14 * BLOCK
 
