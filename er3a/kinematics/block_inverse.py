@@ -199,7 +199,7 @@ def solve_blocks(  # noqa: C901, PLR0912
     q, valid, within, rigid, marked = out
     pose, sides = np.empty(_POSE_ROWS * BLOCK), np.empty((2, _SIDE_ROWS * BLOCK))
     pairs, reference, moved = np.empty((4, _PAIR_ROWS * BLOCK)), np.empty(6 * BLOCK), np.empty((7, SCRATCH))
-    fill_start(moved[0], BLOCK, chain[1][0])
+    fill_start(moved, chain[1][0])
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
         for i in range(BLOCK):
@@ -277,12 +277,11 @@ def _confirm(chain: Chain, pair: Reals, moved: Reals, w: Reals) -> None:
     for row in range(2):
         u = pair[6 * row * BLOCK : 6 * (row + 1) * BLOCK].reshape(6, BLOCK).T
         for k in range(3 * row, 6):
-            cos_sin_rows(u, joint[0, k], joint[1, k], k, moved[k])
-            turn_rows(moved[k], BLOCK, links[k + 1], moved[k + 1])
-        reached = moved[6]
+            cos_sin_rows(u, joint, k, moved)
+            turn_rows(moved, k, links, BLOCK)
         for k in range(12):
             for i in range(BLOCK):
-                fits = abs(reached[k * BLOCK + i] - w[k * BLOCK + i]) <= CONFIRMS / 3
+                fits = abs(moved[6, k * BLOCK + i] - w[k * BLOCK + i]) <= CONFIRMS / 3
                 denied = (pair[_VALID * BLOCK + i] > 0.0) & (not fits)
                 w[_MARK * BLOCK + i] = 1.0 if denied else w[_MARK * BLOCK + i]
 

@@ -252,99 +252,94 @@ def write_rows(x: Row, y: Row, z: Row, out: Reals) -> None:
 
 
 @inner_kernel
-def fill_start(rows: Reals, count: int, link: Reals) -> None:
-    """Set all transforms of a block to a chain's first link. Kernel.
+def fill_start(rows: Reals, link: Reals) -> None:
+    """Begin the chains of a block of transforms. Kernel.
 
     Parameters
     ----------
-    rows : ``SCRATCH`` numbers: a row of ``BLOCK`` for each of the 12 entries of a transform, then cosines and sines
-    count : how many transforms are filled
-    link : (4, 4), m
+    rows : (m + 1, ``SCRATCH``), of which the first is filled: what the transforms are before each row's joint, a
+        stretch of ``BLOCK`` numbers for each of 12 entries, then the joint's cosines and sines
+    link : (4, 4), m, the chain's first
     """
-    for k in range(_COS):
-        rows[k * BLOCK : k * BLOCK + count] = link[k // 4, k % 4]
+    for k in range(12):
+        rows[0, k * BLOCK : (k + 1) * BLOCK] = link[k // 4, k % 4]
 
 
 @inner_kernel
-def cos_sin_rows(u: Reals, sign: float, zero: float, k: int, rows: Reals) -> None:
-    """Fill in a block's cosines and sines of a joint. Kernel.
+def cos_sin_rows(u: Reals, joint: Reals, k: int, rows: Reals) -> None:
+    """Fill in cosines and sines of a joint. Kernel.
 
     Parameters
     ----------
     u : (count, m), rad, motions of the table's rows
-    sign, zero : the joint turns by ``sign * u + zero``, rad
-    k : the joint's row
-    rows : as :func:`fill_start` has it
+    joint : as of :func:`joints_for_blocks`
+    k : number of the joint's row
+    rows : as of :func:`fill_start`
     """
-    far = False
+    sign, zero, far = joint[_SIGN, k], joint[_START, k], False
     for i in range(len(u)):
-        rows[_COS * BLOCK + i] = u[i, k]
+        rows[k, _COS * BLOCK + i] = u[i, k]
     for i in range(len(u)):
-        angle = sign * rows[_COS * BLOCK + i] + zero
-        rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = cos_sin(angle)
+        angle = sign * rows[k, _COS * BLOCK + i] + zero
+        rows[k, _COS * BLOCK + i], rows[k, _SIN * BLOCK + i] = cos_sin(angle)
         far = far | (abs(angle) > LARGEST_ANGLE)
     if far:
         for i in range(len(u)):
             angle = sign * u[i, k] + zero
             if abs(angle) > LARGEST_ANGLE:
-                rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = np.cos(angle), np.sin(angle)
+                rows[k, _COS * BLOCK + i], rows[k, _SIN * BLOCK + i] = np.cos(angle), np.sin(angle)
 
 
 @inner_kernel
-def _slide_rows(u: Reals, sign: float, k: int, rows: Reals) -> None:
+def _slide_rows(u: Reals, joint: Reals, k: int, rows: Reals) -> None:
     """Shift a block of transforms along their z axes by joint ``k``, and leave no turn."""
     for i in range(len(u)):
         for r in range(3):
-            rows[(4 * r + 3) * BLOCK + i] += sign * u[i, k] * rows[(4 * r + 2) * BLOCK + i]
+            rows[k, (4 * r + 3) * BLOCK + i] += joint[_SIGN, k] * u[i, k] * rows[k, (4 * r + 2) * BLOCK + i]
     for i in range(len(u)):
-        rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = 1.0, 0.0
+        rows[k, _COS * BLOCK + i], rows[k, _SIN * BLOCK + i] = 1.0, 0.0
 
 
 @inner_kernel
-def turn_rows(rows: Reals, count: int, link: Reals, out: Reals) -> None:
-    """Multiply a block of transforms by Rz of the block's cosines and sines and by a constant transform. Kernel.
+def turn_rows(rows: Reals, k: int, links: Reals, count: int) -> None:
+    """Multiply a block of transforms by a joint's turn and the link after it. Kernel.
 
     Parameters
     ----------
-    rows : as :func:`fill_start` has it
+    rows : as of :func:`fill_start`; the transforms before the next joint are filled in
+    k : number of the joint's row
+    links : (m + 1, 4, 4), m
     count : how many transforms
-    link : (4, 4), m
-    out : as ``rows``, filled but for cosines and sines; no part of them, so that it takes vector instructions
     """
-    a, b, c, x = link[0, 0], link[0, 1], link[0, 2], link[0, 3]
-    d, e, f, y = link[1, 0], link[1, 1], link[1, 2], link[1, 3]
-    g, h, k, z = link[2, 0], link[2, 1], link[2, 2], link[2, 3]
-    for r in range(3):
-        row, angle = rows[4 * r * BLOCK : 4 * (r + 1) * BLOCK], rows[_COS * BLOCK :]
-        to = out[4 * r * BLOCK : 4 * (r + 1) * BLOCK]
+    (a, b, c, x), (d, e, f, y), (g, h, w, z) = rows_of(links[k + 1])
+    for r in range(0, 12 * BLOCK, 4 * BLOCK):
         for i in range(count):
-            cosine, sine, p, s, t = angle[i], angle[BLOCK + i], row[i], row[BLOCK + i], row[2 * BLOCK + i]
+            cosine, sine = rows[k, _COS * BLOCK + i], rows[k, _SIN * BLOCK + i]
+            p, s, t = rows[k, r + i], rows[k, r + BLOCK + i], rows[k, r + 2 * BLOCK + i]
             p, s = p * cosine + s * sine, s * cosine - p * sine
-            to[i] = p * a + s * d + t * g
-            to[BLOCK + i] = p * b + s * e + t * h
-            to[2 * BLOCK + i] = p * c + s * f + t * k
-            to[3 * BLOCK + i] = row[3 * BLOCK + i] + (p * x + s * y + t * z)
+            rows[k + 1, r + i] = p * a + s * d + t * g
+            rows[k + 1, r + BLOCK + i] = p * b + s * e + t * h
+            rows[k + 1, r + 2 * BLOCK + i] = p * c + s * f + t * w
+            rows[k + 1, r + 3 * BLOCK + i] = rows[k, r + 3 * BLOCK + i] + (p * x + s * y + t * z)
 
 
 @kernel
 def _forward(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
     """Fill ``out`` (N, 4, 4) with tool poses, block by block."""
-    rows, other = np.empty(SCRATCH), np.empty(SCRATCH)
+    rows, last = np.empty((links.shape[0], SCRATCH)), links.shape[0] - 1
     for start in range(0, q.shape[0], BLOCK):
         block, filled = q[start : start + BLOCK], out[start : start + BLOCK]
-        count = len(block)
-        fill_start(rows, count, links[0])
-        for k in range(links.shape[0] - 1):
-            if joint[_SLIDES, k]:  # here, not in a kernel of its own, through which each pose took 12 % longer
-                _slide_rows(block, joint[_SIGN, k], k, rows)
+        fill_start(rows, links[0])
+        for k in range(last):
+            if joint[_SLIDES, k]:  # here, not in a kernel of its own, through which each pose took 25 % longer
+                _slide_rows(block, joint, k, rows)
             else:
-                cos_sin_rows(block, joint[_SIGN, k], joint[_START, k], k, rows)
-            turn_rows(rows, count, links[k + 1], other)
-            rows, other = other, rows
-        for i in range(count):
+                cos_sin_rows(block, joint, k, rows)
+            turn_rows(rows, k, links, len(block))
+        for i in range(len(block)):
             for r in range(3):
                 for c in range(4):
-                    filled[i, r, c] = rows[(4 * r + c) * BLOCK + i] + 0.0  # a zero is positive
+                    filled[i, r, c] = rows[last, (4 * r + c) * BLOCK + i] + 0.0  # a zero is positive
             for j in range(4):
                 filled[i, 3, j] = j // 3  # 0, 0, 0, 1
 
@@ -390,25 +385,24 @@ def _frames(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
 def _jacobian(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
     """Fill ``out`` (N, 6, m) with Jacobians by rows, block by block."""
     joints = q.shape[1]
-    rows, other, columns = np.empty(SCRATCH), np.empty(SCRATCH), np.empty((joints, 6 * BLOCK))
+    rows, columns = np.empty((joints + 1, SCRATCH)), np.empty((joints, 6 * BLOCK))
     for start in range(0, q.shape[0], BLOCK):
         block, filled = q[start : start + BLOCK], out[start : start + BLOCK]
         count = len(block)
-        fill_start(rows, count, links[0])
+        fill_start(rows, links[0])
         for k in range(joints):
             # Until the tool point is known, the linear rows hold a point on the axis.
-            _keep_axis(rows, count, joint[_SIGN, k], columns[k])
+            _keep_axis(rows[k], count, joint[_SIGN, k], columns[k])
             if joint[_SLIDES, k]:
-                _slide_rows(block, joint[_SIGN, k], k, rows)
+                _slide_rows(block, joint, k, rows)
             else:
-                cos_sin_rows(block, joint[_SIGN, k], joint[_START, k], k, rows)
-            turn_rows(rows, count, links[k + 1], other)
-            rows, other = other, rows
+                cos_sin_rows(block, joint, k, rows)
+            turn_rows(rows, k, links, count)
         for k in range(joints):
             if joint[_SLIDES, k]:
                 _along(count, columns[k])
             else:
-                _lever(rows, count, columns[k])
+                _lever(rows[joints], count, columns[k])
         for i in range(count):
             for r in range(6):
                 for k in range(joints):
