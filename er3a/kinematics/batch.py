@@ -200,21 +200,23 @@ def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
 
 def _turn_range(robot: Robot, q: Reals) -> NDArray[np.int8]:
     """Smallest and largest number of whole turns (N, S, n, 2) within the limits; 0 and -1 in empty slots."""
-    turns = np.empty((*q.shape, 2), dtype=np.int8)
+    turns = np.empty((2, *q.shape), dtype=np.int8)
     if whole_turns(robot).alone.all() and not robot.continuous.any():
-        _count_turns(q.reshape(-1, robot.joints), robot.lower, robot.upper, turns.reshape(-1, robot.joints, 2))
-        return turns
-    low, high = turn_bounds(robot, q)
-    turns[..., 0], turns[..., 1] = np.nan_to_num(low), np.nan_to_num(high, nan=-1.0)
-    return turns
+        lower, upper = (np.tile(limit, q.shape[1]) for limit in (robot.lower, robot.upper))
+        _count_turns(q.reshape(-1, len(lower)), lower, upper, turns.reshape(2, -1, len(lower)))
+    else:
+        low, high = turn_bounds(robot, q)
+        turns[:] = np.nan_to_num(low), np.nan_to_num(high, nan=-1.0)
+    return np.moveaxis(turns, 0, -1)
 
 
 @kernel
 def _count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -> None:
-    """What ``turn_bounds`` finds for rows (N, n) of joints that turn and have limits, in turns (N, n, 2)."""
+    """What ``turn_bounds`` finds for joints (N, k) that turn and have limits (k,), in turns (2, N, k)."""
+    low, high = turns[0], turns[1]
     for n in range(q.shape[0]):
         for j in range(q.shape[1]):
-            turns[n, j, 0], turns[n, j, 1] = 0, -1
-            if not np.isnan(q[n, j]):
-                turns[n, j, 0] = np.int8(np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) / TURN))
-                turns[n, j, 1] = np.int8(np.floor((upper[j] + LIMIT_TOLERANCE - q[n, j]) / TURN))
+            least = np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) / TURN)
+            most = np.floor((upper[j] + LIMIT_TOLERANCE - q[n, j]) / TURN)
+            empty = np.isnan(q[n, j])
+            low[n, j], high[n, j] = np.int32(0.0 if empty else least), np.int32(-1.0 if empty else most)
