@@ -279,11 +279,13 @@ def _confirm(chain: Chain, pair: Reals, moved: Reals, w: Reals) -> None:
         for k in range(3 * row, 6):
             cos_sin_rows(u, joint, k, moved)
             turn_rows(moved, k, links, BLOCK)
-        for k in range(12):
+        for r in range(0, 12 * BLOCK, 4 * BLOCK):
             for i in range(BLOCK):
-                fits = abs(moved[6, k * BLOCK + i] - w[k * BLOCK + i]) <= CONFIRMS / 3
-                denied = (pair[_VALID * BLOCK + i] > 0.0) & (not fits)
-                w[_MARK * BLOCK + i] = 1.0 if denied else w[_MARK * BLOCK + i]
+                a, b = moved[6, r + i] - w[r + i], moved[6, r + BLOCK + i] - w[r + BLOCK + i]
+                c, x = moved[6, r + 2 * BLOCK + i], moved[6, r + 3 * BLOCK + i]
+                c, x = c - w[r + 2 * BLOCK + i], x - w[r + 3 * BLOCK + i]
+                denied = not abs(a) + abs(b) + abs(c) + abs(x) <= CONFIRMS / 3
+                w[_MARK * BLOCK + i] = 1.0 if denied & (pair[_VALID * BLOCK + i] > 0.0) else w[_MARK * BLOCK + i]
 
 
 @inner_kernel
