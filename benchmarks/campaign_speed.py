@@ -258,7 +258,7 @@ def table() -> str:
             "",
             f"## Forward kinematics ({FORWARD_POSES:,} poses) and Jacobians ({POSES:,})",
             "",
-            "The C loops (benchmarks/bare_loop.c) multiply by the zeros of right angles too, into memory used again.",
+            "The C loops (benchmarks/bare_loop.c) fill memory that is used again.",
             "",
             "| robot | what | ns a pose | times | difference from the peer |",
             "|---|---|---|---|---|",

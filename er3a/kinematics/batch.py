@@ -11,19 +11,20 @@ from er3a.errors import PoseError, ShapeError
 from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import TURN
-from er3a.kinematics.block_inverse import BLOCK, solve_blocks
+from er3a.kinematics.block_inverse import solve_blocks
 from er3a.kinematics.by_class import arm_solver, checked_parameters, meets_poses, misses, slots_of_class
+from er3a.kinematics.chain import constant_links
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.confirmed import confirmed, to_be_confirmed
-from er3a.kinematics.forward import checked_joints, forward
+from er3a.kinematics.forward import BLOCK, checked_joints, forward, joints_for_blocks
 from er3a.kinematics.inverse import SAME_MEMBER, SOLVES, is_complete, missed_row, missing_class, starts_of
 from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import Method, Solutions, in_doubt, slot_labels
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots, wrist_partition_missing
-from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
+from er3a.numerics.arrays import Flags, Reals, as_floats
 from er3a.numerics.jit import kernel, parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
@@ -77,7 +78,7 @@ def inverse_batch(
     reference = _checked_reference(robot, q_ref, len(T))
     if wrist_partition_missing(robot) or robot.coupling is not None:
         return _by_class(robot, T, reference, turns, threads, redundancy)
-    arm, count = constants_for_blocks(robot), len(T)
+    arm, chain, count = constants_for_blocks(robot), (joints_for_blocks(robot), constant_links(robot)), len(T)
     q = np.empty((count, SLOTS, 6))
     valid, inside = np.empty((count, SLOTS), dtype=bool), np.empty((count, SLOTS), dtype=bool)
     rigid, marked = np.empty(count, dtype=bool), np.empty(count, dtype=bool)
@@ -85,23 +86,22 @@ def inverse_batch(
     def solve(part: slice) -> None:
         own = reference if len(reference) == 1 else reference[part]
         rows = (q[part], valid[part], inside[part], rigid[part], marked[part])
-        solve_blocks(arm, (robot.direction, robot.offset, robot.lower, robot.upper), T[part], own, rows)
+        solve_blocks(arm, chain, (robot.lower, robot.upper), T[part], own, rows)
 
     parallel_for(count, threads, SMALLEST_PART, solve)
     if not rigid.all():
         check_poses(T)
     plain = not robot.combined and not robot.continuous.any()  # what the kernel knows of limits
-    left = np.flatnonzero(marked) if plain else np.arange(count)
+    left, failing = np.flatnonzero(marked) if plain else np.arange(count), np.zeros(count, dtype=bool)
     if left.size:
         own = np.broadcast_to(reference, (count, 6))[left]
         found, fault, _ = solve_slots(robot, T[left], own, keep_folds=True, keep_free=True)
-        q[left] = nearest_equivalent(robot, found, own[:, None])
-        valid[left] = fault == REACHED
-        _put_own(robot, T[left], own, left, q, valid)
-        inside[left] = within(robot, q[left])
-    # The one exit: no row leaves that forward kinematics denies.
-    failing = _confirm(robot, T, q, inside, threads)
-    valid[failing] &= np.isfinite(q[failing, :, 0])
+        rows, solved = nearest_equivalent(robot, found, own[:, None]), fault == REACHED
+        _put_own(robot, T[left], own, rows, solved)
+        fits = within(robot, rows)
+        # No row leaves that forward kinematics denies: of other poses, the blocks have confirmed all.
+        failing[left] = _confirm(robot, T[left], rows, fits, threads)
+        q[left], valid[left], inside[left] = rows, solved & np.isfinite(rows[..., 0]), fits
     branch = np.broadcast_to(np.arange(SLOTS), valid.shape)
     solutions = Solutions(robot, q, valid, inside, branch, turn_range=_turn_range(robot, q) if turns else None)
     return replace(solutions, method=in_doubt(solutions.method), certain=~failing) if failing.any() else solutions
@@ -123,14 +123,14 @@ def _confirm(robot: Robot, T: Reals, q: Reals, inside: Flags, threads: int) -> F
     return failing
 
 
-def _put_own(robot: Robot, T: Reals, own: Reals, left: Integers, q: Reals, valid: Flags) -> None:
+def _put_own(robot: Robot, T: Reals, own: Reals, q: Reals, valid: Flags) -> None:
     """Put references (k, 6) that solve their poses to rounding in their slots, if no row within the limits is them.
 
     That is the slot that is the reference but for rounding, else the one whose branch it is on by the signs of its
     factors: next to two singularities the row there is another member of what solves the pose to rounding.
     """
-    own_rows = np.flatnonzero((np.abs(forward(robot, own) - T).max(axis=(1, 2)) < SOLVES) & within(robot, own))
-    rows, own = left[own_rows], own[own_rows]
+    rows = np.flatnonzero((np.abs(forward(robot, own) - T).max(axis=(1, 2)) < SOLVES) & within(robot, own))
+    own = own[rows]
     away = np.abs(q[rows] - own[:, None]).max(axis=2)
     away = np.where(np.isnan(away), np.inf, away)
     lost = ~(within(robot, q[rows]) & (away < SAME_MEMBER)).any(axis=1)
@@ -200,21 +200,23 @@ def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
 
 def _turn_range(robot: Robot, q: Reals) -> NDArray[np.int8]:
     """Smallest and largest number of whole turns (N, S, n, 2) within the limits; 0 and -1 in empty slots."""
-    turns = np.empty((*q.shape, 2), dtype=np.int8)
+    turns = np.empty((2, *q.shape), dtype=np.int8)
     if whole_turns(robot).alone.all() and not robot.continuous.any():
-        _count_turns(q.reshape(-1, robot.joints), robot.lower, robot.upper, turns.reshape(-1, robot.joints, 2))
-        return turns
-    low, high = turn_bounds(robot, q)
-    turns[..., 0], turns[..., 1] = np.nan_to_num(low), np.nan_to_num(high, nan=-1.0)
-    return turns
+        lower, upper = (np.tile(limit, q.shape[1]) for limit in (robot.lower, robot.upper))
+        _count_turns(q.reshape(-1, len(lower)), lower, upper, turns.reshape(2, -1, len(lower)))
+    else:
+        low, high = turn_bounds(robot, q)
+        turns[:] = np.nan_to_num(low), np.nan_to_num(high, nan=-1.0)
+    return np.moveaxis(turns, 0, -1)
 
 
 @kernel
 def _count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -> None:
-    """What ``turn_bounds`` finds for rows (N, n) of joints that turn and have limits, in turns (N, n, 2)."""
+    """What ``turn_bounds`` finds for joints (N, k) that turn and have limits (k,), in turns (2, N, k)."""
+    low, high = turns[0], turns[1]
     for n in range(q.shape[0]):
         for j in range(q.shape[1]):
-            turns[n, j, 0], turns[n, j, 1] = 0, -1
-            if not np.isnan(q[n, j]):
-                turns[n, j, 0] = np.int8(np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) / TURN))
-                turns[n, j, 1] = np.int8(np.floor((upper[j] + LIMIT_TOLERANCE - q[n, j]) / TURN))
+            least = np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) / TURN)
+            most = np.floor((upper[j] + LIMIT_TOLERANCE - q[n, j]) / TURN)
+            empty = np.isnan(q[n, j])
+            low[n, j], high[n, j] = np.int32(0.0 if empty else least), np.int32(-1.0 if empty else most)

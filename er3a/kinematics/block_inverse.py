@@ -5,7 +5,8 @@ instructions. Joint angles are taken from points (cosine, sine) by one arctangen
 The arm comes in frames in which most constants vanish (below).
 
 Poses at or next to a singularity or the edge of reach are marked and left to :mod:`closed_form`, which knows about free
-joints, boundaries and why a pose is refused.
+joints, boundaries and why a pose is refused. So are poses that forward kinematics of the angles that leave, by the
+links of the robot's table, does not confirm.
 
 The frames:
 
@@ -24,6 +25,7 @@ from er3a.geometry.transforms import MAX_DISTANCE_M, ORTHONORMAL_TOLERANCE
 from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import rows_at
 from er3a.kinematics.classes.arm_angle import about_x, about_z
+from er3a.kinematics.forward import BLOCK, CONFIRMS, SCRATCH, cos_sin_rows, fill_start, turn_rows
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import inner_kernel, kernel
@@ -162,10 +164,9 @@ def _clean(value: float) -> float:
     return 0.0 if abs(value) < 1e-15 else float(value)
 
 
-BLOCK = 64  # poses; a row of 64 numbers fills whole vectors, and all rows stay in the first cache
 NEAR = 1e-6  # m, rad or their product, from where joints become free
 
-Joints = tuple[Reals, Reals, Reals, Reals]
+Chain = tuple[Reals, Reals]  # joints (3, 6) as of ``joints_for_blocks``, and links (7, 4, 4), m
 
 # Rows of scratch memory; a row holds one number of each pose of the block. Offsets are constants, so that the compiler
 # sees that rows don't overlap.
@@ -176,13 +177,19 @@ _VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles eac
 
 @kernel
 def solve_blocks(  # noqa: C901, PLR0912
-    arm: BlockConstants, joints: Joints, T: Reals, q_ref: Reals, out: tuple[Reals, Flags, Flags, Flags, Flags]
+    arm: BlockConstants,
+    chain: Chain,
+    limits: tuple[Reals, Reals],
+    T: Reals,
+    q_ref: Reals,
+    out: tuple[Reals, Flags, Flags, Flags, Flags],
 ) -> None:
     """Solve poses of an arm with a spherical wrist, block by block. Kernel.
 
     Parameters
     ----------
-    joints : direction, offset, lower and upper limits (6,)
+    chain : joints and links of the robot's table
+    limits : lower and upper (6,), rad
     T : (N, 4, 4), m
     q_ref : (N or 1, 6), rad
     out : fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref``, rad,
@@ -191,7 +198,8 @@ def solve_blocks(  # noqa: C901, PLR0912
     """
     q, valid, within, rigid, marked = out
     pose, sides = np.empty(_POSE_ROWS * BLOCK), np.empty((2, _SIDE_ROWS * BLOCK))
-    pairs, reference = np.empty((4, _PAIR_ROWS * BLOCK)), np.empty(6 * BLOCK)
+    pairs, reference, moved = np.empty((4, _PAIR_ROWS * BLOCK)), np.empty(6 * BLOCK), np.empty((7, SCRATCH))
+    fill_start(moved, chain[1][0])
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
         for i in range(BLOCK):
@@ -214,7 +222,8 @@ def solve_blocks(  # noqa: C901, PLR0912
             if pair % 2 == 0:
                 _elbow(arm, pose, side)
             _wrist(arm, pose, side, 1.0 - 2.0 * (pair % 2), pairs[pair])
-            _manufacturers_angles(joints, reference, pairs[pair])
+            _manufacturers_angles(chain[0], limits, reference, pairs[pair])
+            _confirm(chain, pairs[pair], moved, pose)
             for i in range(size):
                 for row in range(6):
                     q[start + i, 2 * pair, row] = pairs[pair, row * BLOCK + i]
@@ -243,16 +252,15 @@ def _check(w: Reals) -> None:
 
 
 @inner_kernel
-def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None:
+def _manufacturers_angles(joint: Reals, limits: tuple[Reals, Reals], reference: Reals, pair: Reals) -> None:
     """Angles theta into the manufacturer's, by the nearest turn within the limits (``nearest_equivalent``)."""
-    direction, offset, lower, upper = joints
     for i in range(BLOCK):
         pair[_WITHIN * BLOCK + i] = pair[_VALID * BLOCK + i]
         pair[(_WITHIN + 1) * BLOCK + i] = pair[_VALID * BLOCK + i]
     for k in range(2):
         for j in range(6):
             row = (6 * k + j) * BLOCK
-            sign, zero, smallest, most = direction[j], offset[j], lower[j], upper[j]
+            sign, zero, smallest, most = joint[0, j], joint[1, j], limits[0][j], limits[1][j]
             inside = (_WITHIN + k) * BLOCK
             for i in range(BLOCK):
                 angle = sign * (pair[row + i] - zero)
@@ -260,6 +268,24 @@ def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None
                 fits = (chosen >= smallest - LIMIT_TOLERANCE) & (chosen <= most + LIMIT_TOLERANCE)
                 pair[inside + i] = pair[inside + i] if fits else 0.0
                 pair[row + i] = chosen if pair[_VALID * BLOCK + i] > 0.0 else np.nan
+
+
+@inner_kernel
+def _confirm(chain: Chain, pair: Reals, moved: Reals, w: Reals) -> None:
+    """Mark poses of which forward kinematics of the manufacturer's angles is off; both rows share joints 1 to 3."""
+    joint, links = chain
+    for row in range(2):
+        u = pair[6 * row * BLOCK : 6 * (row + 1) * BLOCK].reshape(6, BLOCK).T
+        for k in range(3 * row, 6):
+            cos_sin_rows(u, joint, k, moved)
+            turn_rows(moved, k, links, BLOCK)
+        for r in range(0, 12 * BLOCK, 4 * BLOCK):
+            for i in range(BLOCK):
+                a, b = moved[6, r + i] - w[r + i], moved[6, r + BLOCK + i] - w[r + BLOCK + i]
+                c, x = moved[6, r + 2 * BLOCK + i], moved[6, r + 3 * BLOCK + i]
+                c, x = c - w[r + 2 * BLOCK + i], x - w[r + 3 * BLOCK + i]
+                denied = not abs(a) + abs(b) + abs(c) + abs(x) <= CONFIRMS / 3
+                w[_MARK * BLOCK + i] = 1.0 if denied & (pair[_VALID * BLOCK + i] > 0.0) else w[_MARK * BLOCK + i]
 
 
 @inner_kernel

@@ -31,7 +31,7 @@ from er3a.kinematics.classes.class_solvers import (
 )
 from er3a.kinematics.classes.self_motion import OPEN_ROLL, POSE, POSITION, PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
-from er3a.kinematics.forward import forward
+from er3a.kinematics.forward import CONFIRMS, forward
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of, to_rows
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import kernel, parallel_for
@@ -40,7 +40,6 @@ from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_turn, shortest_move, uncoupling, uncoupling_of_linkage
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
-CONFIRMS = 1e-9  # m and rad by which a row may miss what is asked: far above the rounding of a closed form
 OWN_SOLVES, MISSED = 1e-12, 1e-4  # m and parts of 1; rad or m from all rows
 MAYBE_SAME = 1e-2  # rad
 IN_LINE = 1e-9  # rad by which an axis that is taken as the tool's z may be askew

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.by_class import CONFIRMS, arm_solver, confirms, task_mask, with_task_frame
+from er3a.kinematics.by_class import arm_solver, confirms, task_mask, with_task_frame
 from er3a.kinematics.classes.polish import miss_and_pivot
-from er3a.kinematics.forward import forward
+from er3a.kinematics.forward import CONFIRMS, forward
 from er3a.kinematics.numerical import polished
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel, parallel_for
@@ -103,30 +103,25 @@ def to_be_confirmed(robot: Robot, T: Reals, q: Reals, threads: int) -> Integers:
     -------
     numbers : of these poses: some entry of the matrix is off by more than a third of what confirms a row
     """
-    far, slots = np.zeros(len(T), bool), q.shape[1]
+    far = np.zeros(len(T), bool)
 
     def look(part: slice) -> None:
-        back = np.empty((AT_A_TIME * slots, 4, 4))
+        back = np.empty((AT_A_TIME, q.shape[1], 4, 4))
         for start in range(part.start, part.stop, AT_A_TIME):
             own = slice(start, min(start + AT_A_TIME, part.stop))
-            rows = q[own].reshape(-1, q.shape[2])
-            filled = np.flatnonzero(~np.isnan(rows[:, 0]))
-            if len(filled) < len(rows):  # NaN would make the forward kinematics of its block slow
-                rows = rows[filled]
-            reached = forward(robot, rows, out=back[: len(rows)])
-            _look(T[own], filled // slots, reached, CONFIRMS / 3, far[own])
+            _look(T[own], q[own], forward(robot, q[own], out=back[: own.stop - start]), CONFIRMS / 3, far[own])
 
     parallel_for(len(T), threads, AT_A_TIME, look)
     return np.flatnonzero(far)
 
 
 @kernel
-def _look(T: Reals, of: Integers, back: Reals, most: float, far: Flags) -> None:
-    """Which poses (N, 4, 4) have a row that is off: its pose (K, 4, 4), of the pose of number ``of`` (K,)."""
-    for k in range(len(of)):
-        off = 0.0
-        for i in range(3):
-            for j in range(4):
-                off = max(off, abs(back[k, i, j] - T[of[k], i, j]))
-        if not off <= most:
-            far[of[k]] = True
+def _look(T: Reals, q: Reals, back: Reals, most: float, far: Flags) -> None:
+    """Which poses (N, 4, 4) have a row (N, S, n) that is off: its pose is that of ``back`` (N, S, 4, 4)."""
+    for n in range(len(T)):
+        for slot in range(q.shape[1]):
+            off = 0.0
+            for i in range(3):
+                for j in range(4):
+                    off = max(off, abs(back[n, slot, i, j] - T[n, i, j]))
+            far[n] |= not (off <= most or np.isnan(q[n, slot, 0]))

@@ -17,11 +17,12 @@ from er3a.numerics.jit import inner_kernel, is_compiled, kernel
 from er3a.robots.robot import Robot, derived
 
 Row = tuple[float, float, float, float]
-Axes = tuple[int, int, float, float]  # the columns in scratch memory that hold y and z, and their signs there
 
 BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
 _SIGN, _START, _SLIDES = 0, 1, 2  # rows of the kernels' ``joint``
+CONFIRMS = 1e-9  # m and rad by which a row may miss what is asked: far above the rounding of a closed form
 _COS, _SIN = 12, 13  # rows of scratch memory after the 3 x 4 entries of a block of poses
+SCRATCH = 14 * BLOCK
 
 
 def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None = None) -> Reals:
@@ -69,7 +70,7 @@ def forward_of_rows(robot: Robot, u: Reals) -> Reals:
     T : (N, 4, 4), T_base_tool, m
     """
     out = np.empty((len(u), 4, 4))
-    _fill_poses(for_kernel(u), _joints(robot), constant_links(robot), out)
+    _fill_poses(for_kernel(u), joints_for_blocks(robot), constant_links(robot), out)
     return out
 
 
@@ -147,15 +148,20 @@ def checked_joints(robot: Robot, q: Reals, argument: str = "q") -> Reals:
 
 
 def _motion(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
-    """Kernel arguments: each row's motion u (N, m), and :func:`_joints`."""
+    """Kernel arguments: each row's motion u (N, m), and :func:`joints_for_blocks`."""
     u = row_values(robot, q).reshape(-1, robot.rows)
     u.setflags(write=False)  # as kernels take arrays; this view, not q
-    return u, _joints(robot)
+    return u, joints_for_blocks(robot)
 
 
 @derived
-def _joints(robot: Robot) -> Reals:
-    """Each row's direction, start value of x, and 1 if it slides: (3, m), one array, as each costs a call 0.2 us."""
+def joints_for_blocks(robot: Robot) -> Reals:
+    """What kernels over blocks take of the rows' joints.
+
+    Returns
+    -------
+    joint : (3, m), each row's direction, start value of x, and 1 if it slides; one array, as each costs a call 0.2 us
+    """
     return for_kernel(np.array([robot.direction, joint_starts(robot), robot.sliding]))
 
 
@@ -246,58 +252,94 @@ def write_rows(x: Row, y: Row, z: Row, out: Reals) -> None:
 
 
 @inner_kernel
-def _cos_sin_rows(q: Reals, sign: float, zero: float, k: int, of_y: float, rows: Reals) -> bool:
-    """Rows 12 and 13: cosines of joint ``k`` for a block, and sines times y's sign; whether one is NaN or far off."""
-    far = False
-    for i in range(len(q)):
-        rows[_COS * BLOCK + i] = q[i, k]
-    for i in range(len(q)):
-        angle = sign * rows[_COS * BLOCK + i] + zero
-        c, s = cos_sin(angle)
-        rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = c, of_y * s
-        far = far | (not abs(angle) <= LARGEST_ANGLE)
-    if far:
-        for i in range(len(q)):
-            angle = sign * q[i, k] + zero
-            if not abs(angle) <= LARGEST_ANGLE:
-                rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = np.cos(angle), of_y * np.sin(angle)
-    return far
+def fill_start(rows: Reals, link: Reals) -> None:
+    """Begin the chains of a block of transforms. Kernel.
+
+    Parameters
+    ----------
+    rows : (m + 1, ``SCRATCH``), of which the first is filled: what the transforms are before each row's joint, a
+        stretch of ``BLOCK`` numbers for each of 12 entries, then the joint's cosines and sines
+    link : (4, 4), m, the chain's first
+    """
+    for k in range(12):
+        rows[0, k * BLOCK : (k + 1) * BLOCK] = link[k // 4, k % 4]
 
 
 @inner_kernel
-def _slide_rows(q: Reals, sign: float, k: int, rows: Reals, axes: Axes) -> None:
-    """Shift a block of transforms along their z axes by joint ``k``, and leave no turn in rows 12 and 13."""
-    for i in range(len(q)):
-        along = sign * q[i, k] * axes[3]
+def cos_sin_rows(u: Reals, joint: Reals, k: int, rows: Reals) -> None:
+    """Fill in cosines and sines of a joint. Kernel.
+
+    Parameters
+    ----------
+    u : (count, m), rad, motions of the table's rows
+    joint : as of :func:`joints_for_blocks`
+    k : number of the joint's row
+    rows : as of :func:`fill_start`
+    """
+    sign, zero, far = joint[_SIGN, k], joint[_START, k], False
+    for i in range(len(u)):
+        rows[k, _COS * BLOCK + i] = u[i, k]
+    for i in range(len(u)):
+        angle = sign * rows[k, _COS * BLOCK + i] + zero
+        rows[k, _COS * BLOCK + i], rows[k, _SIN * BLOCK + i] = cos_sin(angle)
+        far = far | (abs(angle) > LARGEST_ANGLE)
+    if far:
+        for i in range(len(u)):
+            angle = sign * u[i, k] + zero
+            if abs(angle) > LARGEST_ANGLE:
+                rows[k, _COS * BLOCK + i], rows[k, _SIN * BLOCK + i] = np.cos(angle), np.sin(angle)
+
+
+@inner_kernel
+def _slide_rows(u: Reals, joint: Reals, k: int, rows: Reals) -> None:
+    """Shift a block of transforms along their z axes by joint ``k``, and leave no turn."""
+    for i in range(len(u)):
         for r in range(3):
-            rows[(4 * r + 3) * BLOCK + i] += along * rows[(4 * r + axes[1]) * BLOCK + i]
-    for i in range(len(q)):
-        rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = 1.0, 0.0
+            rows[k, (4 * r + 3) * BLOCK + i] += joint[_SIGN, k] * u[i, k] * rows[k, (4 * r + 2) * BLOCK + i]
+    for i in range(len(u)):
+        rows[k, _COS * BLOCK + i], rows[k, _SIN * BLOCK + i] = 1.0, 0.0
+
+
+@inner_kernel
+def turn_rows(rows: Reals, k: int, links: Reals, count: int) -> None:
+    """Multiply a block of transforms by a joint's turn and the link after it. Kernel.
+
+    Parameters
+    ----------
+    rows : as of :func:`fill_start`; the transforms before the next joint are filled in
+    k : number of the joint's row
+    links : (m + 1, 4, 4), m
+    count : how many transforms
+    """
+    (a, b, c, x), (d, e, f, y), (g, h, w, z) = rows_of(links[k + 1])
+    for r in range(0, 12 * BLOCK, 4 * BLOCK):
+        for i in range(count):
+            cosine, sine = rows[k, _COS * BLOCK + i], rows[k, _SIN * BLOCK + i]
+            p, s, t = rows[k, r + i], rows[k, r + BLOCK + i], rows[k, r + 2 * BLOCK + i]
+            p, s = p * cosine + s * sine, s * cosine - p * sine
+            rows[k + 1, r + i] = p * a + s * d + t * g
+            rows[k + 1, r + BLOCK + i] = p * b + s * e + t * h
+            rows[k + 1, r + 2 * BLOCK + i] = p * c + s * f + t * w
+            rows[k + 1, r + 3 * BLOCK + i] = rows[k, r + 3 * BLOCK + i] + (p * x + s * y + t * z)
 
 
 @kernel
 def _forward(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
     """Fill ``out`` (N, 4, 4) with tool poses, block by block."""
-    rows = np.empty((_SIN + 1) * BLOCK)
+    rows, last = np.empty((links.shape[0], SCRATCH)), links.shape[0] - 1
     for start in range(0, q.shape[0], BLOCK):
         block, filled = q[start : start + BLOCK], out[start : start + BLOCK]
-        count = len(block)
-        axes = _fill_start(rows, count, links[0])
-        for k in range(links.shape[0] - 1):
-            far = False
-            if joint[_SLIDES, k]:  # here, not in a kernel of its own, through which each pose took 12 % longer
-                _slide_rows(block, joint[_SIGN, k], k, rows, axes)
+        fill_start(rows, links[0])
+        for k in range(last):
+            if joint[_SLIDES, k]:  # here, not in a kernel of its own, through which each pose took 25 % longer
+                _slide_rows(block, joint, k, rows)
             else:
-                far = _cos_sin_rows(block, joint[_SIGN, k], joint[_START, k], k, axes[2], rows)
-            axes = _turn_and_step(rows, count, links[k + 1], axes, far)
-        ys, zs = rows[axes[0] * BLOCK :], rows[axes[1] * BLOCK :]
-        for i in range(count):
+                cos_sin_rows(block, joint, k, rows)
+            turn_rows(rows, k, links, len(block))
+        for i in range(len(block)):
             for r in range(3):
-                # Plus 0.0: a zero is positive, as it would be among the sums that were left out.
-                filled[i, r, 0] = rows[4 * r * BLOCK + i] + 0.0
-                filled[i, r, 1] = axes[2] * ys[4 * r * BLOCK + i] + 0.0
-                filled[i, r, 2] = axes[3] * zs[4 * r * BLOCK + i] + 0.0
-                filled[i, r, 3] = rows[(4 * r + 3) * BLOCK + i]
+                for c in range(4):
+                    filled[i, r, c] = rows[last, (4 * r + c) * BLOCK + i] + 0.0  # a zero is positive
             for j in range(4):
                 filled[i, 3, j] = j // 3  # 0, 0, 0, 1
 
@@ -319,42 +361,6 @@ def _forward_by_arrays(q: Reals, joint: Reals, links: Reals, out: Reals) -> None
 
 
 _fill_poses = _forward if is_compiled() else _forward_by_arrays
-
-
-@inner_kernel
-def _turn_and_step(rows: Reals, count: int, link: Reals, axes: Axes, dense: bool) -> Axes:
-    """Multiply a block of transforms by Rz of the block's cosines and sines and by a constant transform.
-
-    Right angles about x, which nearly all tables have, multiply nothing: they rename columns. If a joint value is NaN,
-    the product is ``dense``, so that NaN reaches every entry of its pose.
-    """
-    to_y, to_z, of_y, of_z = axes
-    a, b, c, x = link[0, 0], link[0, 1], link[0, 2], link[0, 3]
-    d, e, f, y = link[1, 0] * of_y, link[1, 1] * of_y, link[1, 2] * of_y, link[1, 3] * of_y
-    g, h, k, z = link[2, 0] * of_z, link[2, 1] * of_z, link[2, 2] * of_z, link[2, 3] * of_z
-    about_x = (a == 1.0) & (b == 0.0) & (c == 0.0) & (d == 0.0) & (g == 0.0) & (y == 0.0)
-    right = (e * f == 0.0) & (h * k == 0.0) & (e * e + f * f == 1.0) & (h * h + k * k == 1.0)
-    sparse = about_x & right & (not dense)
-    for r in range(3):
-        row, angle = rows[4 * r * BLOCK : 4 * (r + 1) * BLOCK], rows[_COS * BLOCK :]
-        ys, zs = row[to_y * BLOCK : (to_y + 1) * BLOCK], row[to_z * BLOCK : (to_z + 1) * BLOCK]
-        if sparse:
-            for i in range(count):
-                cosine, sine, p, s = angle[i], angle[BLOCK + i], row[i], ys[i]
-                p, s = p * cosine + s * sine, s * cosine - p * sine
-                row[i], ys[i] = p, s
-                row[3 * BLOCK + i] += p * x + zs[i] * z
-        else:
-            for i in range(count):
-                cosine, sine, p, s, t = angle[i], angle[BLOCK + i], row[i], ys[i], zs[i]
-                p, s = p * cosine + s * sine, s * cosine - p * sine
-                row[i] = p * a + s * d + t * g
-                ys[i] = p * b + s * e + t * h
-                zs[i] = p * c + s * f + t * k
-                row[3 * BLOCK + i] += p * x + s * y + t * z
-    if not sparse:
-        return to_y, to_z, 1.0, 1.0
-    return (to_y, to_z, e, k) if f == 0.0 else (to_z, to_y, h, f)
 
 
 @kernel
@@ -379,25 +385,24 @@ def _frames(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
 def _jacobian(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
     """Fill ``out`` (N, 6, m) with Jacobians by rows, block by block."""
     joints = q.shape[1]
-    rows, columns = np.empty((_SIN + 1) * BLOCK), np.empty((joints, 6 * BLOCK))
+    rows, columns = np.empty((joints + 1, SCRATCH)), np.empty((joints, 6 * BLOCK))
     for start in range(0, q.shape[0], BLOCK):
         block, filled = q[start : start + BLOCK], out[start : start + BLOCK]
         count = len(block)
-        axes = _fill_start(rows, count, links[0])
+        fill_start(rows, links[0])
         for k in range(joints):
             # Until the tool point is known, the linear rows hold a point on the axis.
-            _keep_axis(rows, count, axes, joint[_SIGN, k], columns[k])
-            far = False
+            _keep_axis(rows[k], count, joint[_SIGN, k], columns[k])
             if joint[_SLIDES, k]:
-                _slide_rows(block, joint[_SIGN, k], k, rows, axes)
+                _slide_rows(block, joint, k, rows)
             else:
-                far = _cos_sin_rows(block, joint[_SIGN, k], joint[_START, k], k, axes[2], rows)
-            axes = _turn_and_step(rows, count, links[k + 1], axes, far)
+                cos_sin_rows(block, joint, k, rows)
+            turn_rows(rows, k, links, count)
         for k in range(joints):
             if joint[_SLIDES, k]:
                 _along(count, columns[k])
             else:
-                _lever(rows, count, columns[k])
+                _lever(rows[joints], count, columns[k])
         for i in range(count):
             for r in range(6):
                 for k in range(joints):
@@ -405,21 +410,12 @@ def _jacobian(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
 
 
 @inner_kernel
-def _fill_start(rows: Reals, count: int, link: Reals) -> Axes:
-    """Set all poses of a block to the first link; returns which columns hold y and z, and their signs."""
-    for k in range(12):
-        rows[k * BLOCK : k * BLOCK + count] = link[k // 4, k % 4]
-    return int(1), int(2), 1.0, 1.0  # noqa: RUF046, UP018  (see inner_kernel)
-
-
-@inner_kernel
-def _keep_axis(rows: Reals, count: int, axes: Axes, sign: float, column: Reals) -> None:
+def _keep_axis(rows: Reals, count: int, sign: float, column: Reals) -> None:
     """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
-        zs = rows[(4 * r + axes[1]) * BLOCK :]
         for i in range(count):
             column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]
-            column[(3 + r) * BLOCK + i] = (axes[3] * zs[i] + 0.0) * sign
+            column[(3 + r) * BLOCK + i] = (rows[(4 * r + 2) * BLOCK + i] + 0.0) * sign
 
 
 @inner_kernel

@@ -13,7 +13,7 @@ from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import typed_pose
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
-from er3a.kinematics.by_class import CONFIRMS, confirms, meets_poses, misses, task_mask
+from er3a.kinematics.by_class import confirms, meets_poses, misses, task_mask
 from er3a.kinematics.chain import joint_starts
 from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, BranchSolver, LinkedRows
@@ -21,7 +21,7 @@ from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.confirmed import ClosedFormArm, confirmed, regular_turns
 from er3a.kinematics.families import Family, families, is_regular
-from er3a.kinematics.forward import checked_joints, forward
+from er3a.kinematics.forward import CONFIRMS, checked_joints, forward
 from er3a.kinematics.numerical import all_found, nearest_arm, solve
 from er3a.kinematics.self_motions import SelfMotionCurve, to_rows
 from er3a.kinematics.singularity import determinant_factors

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 import er3a
 from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.kinematics import batch
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.wrist_partitioned import solve_slots
+from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots
 from er3a.robots.joint_limits import nearest_equivalent, within
 from testing.arms import DEG, OTHERS_LONG, arms, joints_at_random, joints_within, margin, pose_errors
 from testing.singular_poses import CLASSES, branch_of, joints_near, turned
@@ -62,6 +63,17 @@ def test_singular_poses_keep_all_their_slots(robot, random, kind):
         rows = solved.q[n][solved.solved[n]]
         apart = np.abs(rows[:, None] - rows[None]).max(axis=-1) + np.eye(len(rows))
         assert apart.min() > 1e-9
+
+
+def test_what_forward_kinematics_denies_goes_to_the_careful_solver(robot, random, monkeypatch):
+    T, constants = forward(robot, joints_at_random(robot, random, 500)), constants_for_blocks(robot)
+    right = inverse_batch(robot, T)
+    longer = constants._replace(upper_arm=constants.upper_arm + 1e-8)
+    monkeypatch.setattr(batch, "constants_for_blocks", lambda robot: longer)
+    solved = inverse_batch(robot, T)
+    assert_solves(robot, T, solved)
+    np.testing.assert_array_equal(solved.solved, right.solved)
+    assert solved.certain is None
 
 
 def test_slots_are_branches(robot, random):
