@@ -26,7 +26,7 @@ SPARE_TURNS, SPARE_SHIFTS = np.radians([1.0, 2.0, 5.0, 10.0]), np.array([5.0, 10
 """Margins beyond the smallest turn (rad) or shift (m) for an advised one; the first usable margin is taken."""
 SHOWN_ANGLE, SHOWN_LENGTH = np.radians(0.01), 1e-4
 """Rounding of advised poses."""
-CHUNK = 512  # points solved at a time, until one is usable
+CHUNKS = 32 * (2 ** np.arange(1, 12) - 1)  # of changes that are tried, until one is usable: twice as many each time
 
 Usable = Callable[[Reals], Flags]
 """Which arms (N, n), rad, within the limits count, (N,)."""
@@ -146,7 +146,7 @@ def _least(
         ticks = np.linspace(-half, half, count)
         changes = centre + np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
         changes = changes[np.linalg.norm(changes, axis=1).argsort(kind="stable")]
-        parts = (changes[k : k + CHUNK] for k in range(0, len(changes), CHUNK))
+        parts = np.split(changes, CHUNKS[CHUNKS < len(changes)])
         solved = (part[solvable(robot, made(part), usable)] for part in parts)
         best = next((part[0] for part in solved if len(part)), None)
         if best is None:
