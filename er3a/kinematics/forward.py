@@ -58,7 +58,8 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
 
 
 def forward_of_rows(robot: Robot, u: Reals) -> Reals:
-    """Poses of the tool point for the motion of the table's rows, before any coupling.
+    """Poses of the tool point for the motion of the table's rows, before any coupling; not compiled, so that searches
+    that rest on them go the same way in every process.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def forward_of_rows(robot: Robot, u: Reals) -> Reals:
     T : (N, 4, 4), T_base_tool, m
     """
     out = np.empty((len(u), 4, 4))
-    _fill_poses(for_kernel(u), _joints(robot), constant_links(robot), out)
+    _forward_by_arrays(for_kernel(u), _joints(robot), constant_links(robot), out)
     return out
 
 
