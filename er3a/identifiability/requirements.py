@@ -69,7 +69,7 @@ class SoughtExtreme:
             climbs,
         )
         self.q = self._whole(q[0])
-        return self.sign * values[0] * quantities.MM
+        return self.sign * float(values[0]) * quantities.MM
 
     def _whole(self, q: Reals) -> Reals:
         whole = np.zeros((*q.shape[:-1], self.robot.joints))
