@@ -46,7 +46,7 @@ Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
-ALIGN_POSES, ALIGNED, ALIGN_STEPS = 100, 30, 5  # of the first round; rounds, and steps in each
+ALIGN_POSES, ALIGNED, STEPS = 100, 30, {"maxiter": 5}  # of the first round; rounds, and steps in each
 SAME_FOUND = 1 + 2e-4  # of the worst distance in an alignment, when a search ends
 NEAR_WORST = 0.8  # of it, from which on a pose is kept
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
@@ -527,7 +527,8 @@ def _aligned(
     largest distance over the joint ranges is least: a minimax problem, solved by exchange [1]_. Of some poses the
     largest distance is made least, by sequential quadratic programming; then those where it is largest now are added.
     What is least for some poses bounds from below what is for all, near this minimum. The search ends when the best
-    that it has found is that near its bound. At last the flange is turned, by least squares.
+    that it has found is that near its bound. Between rounds numbers are rounded, so that a last bit, which can depend
+    on the number of threads, does not grow. At last the flange is turned, by least squares.
 
     References
     ----------
@@ -560,14 +561,13 @@ def _aligned(
             break
         q = np.r_[q, ends]
         nearer = {"type": "ineq", "fun": lambda y, q=q: y[-1] - shift_between(*flanges(moved(y[:-1]), q))}
-        options = {"maxiter": ALIGN_STEPS}
-        y = scipy.optimize.minimize(lambda y: y[-1], np.r_[x, off[0]], constraints=nearer, options=options).x
+        y = scipy.optimize.minimize(lambda y: y[-1], np.r_[x, off[0]], constraints=nearer, options=STEPS).x.round(SHOWN)
         x, bound = y[:-1], y[-1]
         q = q[shift_between(*now(q)) > NEAR_WORST * bound]
     one, other = (each[:, :3, :3] for each in flanges(best, q))
     turn = nearest_rotations(np.einsum("kjl,kji->li", one, other))
     best = replace(best, flange=posed(turn, np.zeros(3)) @ best.flange)
-    pairs = (lambda q: (forward(first, q), forward(second, q)), lambda q: flanges(best, q))
+    pairs = lambda q: (forward(first, q), forward(second, q)), lambda q: flanges(best, q)
     turns = [worst_poses(turn_between, each, a)[0][0] for each in pairs]
     return best, (1000 * worst_poses(shift_between, pairs[0], a)[0][0], 1000 * least, *map(math.degrees, turns))
 

@@ -305,9 +305,10 @@ def _forward(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
 
 @np.errstate(all="ignore")  # as kernels have it
 def _forward_by_arrays(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
-    """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow."""
+    """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow. No product is BLAS's,
+    whose last bit depends on the number of threads."""
     out[:] = links[0]
-    entries, (x, y, z, place) = out.reshape(-1, 4), np.moveaxis(out, 2, 0)
+    x, y, z, place = np.moveaxis(out, 2, 0)
     for k, link in enumerate(links[1:]):
         u = joint[_SIGN, k] * q[:, k, None]
         if joint[_SLIDES, k]:
@@ -315,7 +316,7 @@ def _forward_by_arrays(q: Reals, joint: Reals, links: Reals, out: Reals) -> None
         else:
             cosine, sine = np.cos(u + joint[_START, k]), np.sin(u + joint[_START, k])
             x[:], y[:] = cosine * x + sine * y, cosine * y - sine * x
-        entries[:] = entries @ link
+        out[:] = np.einsum("nij,jk->nik", out, link)
     out[:, 3] = 0.0, 0.0, 0.0, 1.0
 
 
