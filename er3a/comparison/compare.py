@@ -23,7 +23,16 @@ from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
-from er3a.geometry.transforms import exp_rotation, log_rotation, posed, rot_x, rot_z, rotation_angle, translation
+from er3a.geometry.transforms import (
+    exp_rotation,
+    log_rotation,
+    nearest_rotations,
+    posed,
+    rot_x,
+    rot_z,
+    rotation_angle,
+    translation,
+)
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
@@ -37,9 +46,9 @@ Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
-ALIGNED, ALIGN_TRIES, ALIGN_POSES = 6, 200, 128  # rounds, evaluations in each, and poses of the first
-ALIGN_POWER = 4  # of a distance, by which it counts
-TURN_COUNTS = 0.01  # m, of the flange's axes in an alignment, so that a turn about its origin is not free
+ALIGN_POSES, ALIGNED, STEPS = 100, 30, {"maxiter": 5}  # of the first round; rounds, and steps in each
+SAME_FOUND = 1 + 2e-4  # of the worst distance in an alignment, when a search ends
+NEAR_WORST = 0.8  # of it, from which on a pose is kept
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
 NO_TURN, HALF_TURN = 1e-9, np.pi - 1e-4  # rad, below and above which an axis has no sense
 NO_OFFSET = 1e-6  # m, of a row from an axis; sine of its tilt; entry of a coupling; largest distance worth a search
@@ -508,55 +517,59 @@ def _alignment(found: mechanism.Match) -> Alignment:
     return Alignment(found.base, found.flange, found.zeros, np.where(found.reverses, -1.0, 1.0))
 
 
-def _aligned_flanges(a: Robot, b: Robot, by: Alignment, u: Reals) -> Reals:
-    """B's flanges (k, 4, 4) brought to A's, at values (k, m) of A's rows."""
-    moved = forward_of_rows(b, by.signs * (u - by.zeros * a.direction))
-    return by.base @ moved @ np.linalg.inv(by.flange)
-
-
 def _aligned(
     as_printed: tuple[Robot, Robot], in_right_units: tuple[Robot, Robot], found: mechanism.Match, same: bool
 ) -> tuple[Alignment, tuple[float, ...]]:
     """What aligns B with A; largest distances (mm), then angles (deg), of the flanges that were found, each as printed
     and aligned.
 
-    Unless both are the ``same`` mechanism, base, flange and zeros are moved from where the match has them until B's
-    flange is nearest to A's at the worst pose: least sum of a high power of distances, after each round also at the
-    pose found to be the worst by then.
+    Unless both are the ``same`` mechanism, base, flange and zeros are moved from where the match has them until the
+    largest distance over the joint ranges is least: a minimax problem, solved by exchange [1]_. Of some poses the
+    largest distance is made least, by sequential quadratic programming; then those where it is largest now are added.
+    What is least for some poses bounds from below what is for all, near this minimum. The search ends when the best
+    that it has found is that near its bound. Between rounds numbers are rounded, so that a last bit, which can depend
+    on the number of threads, does not grow. At last the flange is turned, by least squares.
+
+    References
+    ----------
+    .. [1] R. Hettich, K. O. Kortanek, "Semi-infinite programming: theory, methods, and applications", SIAM Review 35
+       (1993).
     """
     (first, second), (a, b) = ([robot.without_tool() for robot in pair] for pair in (as_printed, in_right_units))
-    start = _alignment(found)
+    best = start = _alignment(found)
     q = np.random.default_rng(0).uniform(a.lower, a.upper, (ALIGN_POSES, a.joints))
+    x, least, bound = np.zeros(8 + a.rows), np.inf, NO_OFFSET
 
     def moved(x: Reals) -> Alignment:
-        base, flange = (posed(exp_rotation(own[3:]), own[:3]) for own in (x[:6], x[6:12]))
-        return Alignment(base @ start.base, start.flange @ flange, start.zeros + x[12:], start.signs)
+        """Turned (rad) and shifted (m) at the base, shifted at the flange, with other zeros after the first."""
+        base = posed(exp_rotation(x[:3]), x[3:6]) @ start.base
+        return Alignment(base, start.flange @ translation(*x[6:9]), start.zeros + np.r_[0, x[9:]], start.signs)
 
-    def printed(poses: Reals) -> tuple[Reals, Reals]:
-        return forward(first, poses), forward(second, poses)
-
-    def flanges(x: Reals, poses: Reals) -> tuple[Reals, Reals]:
+    def flanges(by: Alignment, poses: Reals) -> tuple[Reals, Reals]:
         u = row_values(a, poses)
-        return forward_of_rows(a, u), _aligned_flanges(a, b, moved(x), u)
+        there = forward_of_rows(b, by.signs * (u - by.zeros * a.direction))
+        return forward_of_rows(a, u), by.base @ there @ np.linalg.inv(by.flange)
 
-    def off(x: Reals, u: Reals, one: Reals, scale: float) -> Reals:
-        gap = (_aligned_flanges(a, b, moved(x), u) - one)[:, :3] * (TURN_COUNTS, TURN_COUNTS, TURN_COUNTS, 1.0)
-        gap = gap.reshape(len(u), 12) / max(scale, NO_OFFSET)
-        return np.asarray((gap * np.linalg.norm(gap, axis=1)[:, None] ** ALIGN_POWER).ravel())
+    def now(poses: Reals) -> tuple[Reals, Reals]:
+        return flanges(moved(x), poses)
 
-    best = x = np.zeros(12 + a.rows)
-    least, worst = worst_pose(shift_between, lambda poses: flanges(best, poses), a)
-    for _ in range(ALIGNED if least > NO_OFFSET and not same else 0):
-        q = np.concatenate([q, worst[None]])
-        u = row_values(a, q)
-        x = scipy.optimize.leastsq(off, x, (u, forward_of_rows(a, u), least), maxfev=ALIGN_TRIES, full_output=True)[0]
-        now = x
-        gap, worst = worst_pose(shift_between, lambda poses, now=now: flanges(now, poses), a)  # type: ignore[misc]
-        if gap < least:
-            best, least = x, gap
-    shift = worst_pose(shift_between, printed, a)[0]
-    turns = [worst_pose(turn_between, each, a)[0] for each in (printed, lambda poses: flanges(best, poses))]
-    return moved(best), (1000 * shift, 1000 * least, *map(math.degrees, turns))
+    for _ in range(1 if same else ALIGNED):
+        off, ends = worst_poses(shift_between, now, a)
+        if off[0] < least:
+            best, least = moved(x), off[0]
+        if least <= bound * SAME_FOUND:
+            break
+        q = np.r_[q, ends]
+        nearer = {"type": "ineq", "fun": lambda y, q=q: y[-1] - shift_between(*flanges(moved(y[:-1]), q))}
+        y = scipy.optimize.minimize(lambda y: y[-1], np.r_[x, off[0]], constraints=nearer, options=STEPS).x.round(SHOWN)
+        x, bound = y[:-1], y[-1]
+        q = q[shift_between(*now(q)) > NEAR_WORST * bound]
+    one, other = (each[:, :3, :3] for each in flanges(best, q))
+    turn = nearest_rotations(np.einsum("kjl,kji->li", one, other))
+    best = replace(best, flange=posed(turn, np.zeros(3)) @ best.flange)
+    pairs = lambda q: (forward(first, q), forward(second, q)), lambda q: flanges(best, q)
+    turns = [worst_poses(turn_between, each, a)[0][0] for each in pairs]
+    return best, (1000 * worst_poses(shift_between, pairs[0], a)[0][0], 1000 * least, *map(math.degrees, turns))
 
 
 def shift_between(one: Reals, other: Reals) -> Reals:
@@ -588,10 +601,10 @@ def turn_between(one: Reals, other: Reals) -> Reals:
     return rotation_angle(one[:, :3, :3], other[:, :3, :3])
 
 
-def worst_pose(
+def worst_poses(
     off: Callable[[Reals, Reals], Reals], flanges: Callable[[Reals], tuple[Reals, Reals]], robot: Robot
-) -> tuple[float, Reals]:
-    """The largest of what two flanges are off over an arm's joint ranges, as far as :func:`peak` finds it.
+) -> tuple[list[float], Reals]:
+    """Where two flanges are most off over an arm's joint ranges, as far as :func:`peak` finds it.
 
     Parameters
     ----------
@@ -601,12 +614,12 @@ def worst_pose(
 
     Returns
     -------
-    largest : no bound: the true one may be a little larger
-    q : (n,), rad or m, where it was found
+    largest : k of them, the largest first, which is no bound: the true one may be a little larger
+    q : (k, n), rad or m, where they were found
     """
-    lower, upper = np.minimum(robot.lower, robot.upper), np.maximum(robot.lower, robot.upper)
+    lower, upper = np.sort([robot.lower, robot.upper], axis=0)
     q, largest = peak(lambda q: off(*flanges(q)), lower, upper, box_points(lower, upper))
-    return largest, q
+    return largest.tolist(), q
 
 
 # Units ----------------------------------------------------------------------------------------------------------------
@@ -803,7 +816,7 @@ def _corrected(
         columns[column][k] = _rounded(columns[column][k] + found.zeros[k], column == "offset")
     base, flange = _ends_corrected(robot_a, found, tolerances, columns)
     # Corrected zeros and directions make A's joint values those of B.
-    ends = np.sort(np.stack([signs * (end - joint_zeros) for end in (robot_a.lower, robot_a.upper)]), axis=0)
+    ends = np.sort([signs * (end - joint_zeros) for end in (robot_a.lower, robot_a.upper)], axis=0)
     lower, upper, continuous = ends[0], ends[1], robot_a.continuous
     combined = _sums_of_b(robot_a, signs, -signs * joint_zeros)
     if limits.same is False or (robot_b.states("limits") and not robot_a.states("limits")):

@@ -63,7 +63,7 @@ class KnownArm:
             away = (forward(self.robot, q)[:, :3, 3] - base[:3, 3]) @ base[:3, :2]
             return np.asarray(np.linalg.norm(away, axis=1))
 
-        return peak(across, lower, upper, box_points(lower, upper))[1]
+        return peak(across, lower, upper, box_points(lower, upper))[1][0]
 
 
 @cache

@@ -21,7 +21,7 @@ _BLOCK = re.compile(
 _AS_RECORDS = (
     (r"(?<=[\w\"'])[ \t]+(?=\w+=[\"'][^\"'\n]*[\"'][^<>\n]*/>)", ", "),
     (r"<\w+,([^<>\n]*)/>", r"{\1}"),  # attributes in XML
-    (r"(?m)^[^=,;(\[{\n]*:[ \t]*((?:\w+[ \t]*=[ \t]*[^,=(\[{\n]+,[ \t]*){2,8}\w+[ \t]*=[^,=(\[{\n]+)$", r"{\1}"),
+    (r"(?m)^[^=,;(\[{|\n]*:[ \t]*((?:\w+[ \t]*=[ \t]*[^,=(\[{\n]+,[ \t]*){2,8}\w+[ \t]*=[^,=(\[{\n]+)$", r"{\1}"),
 )
 """Rows of one line each, as records."""
 _STREAMED = re.compile(r"<<([^;<>]{0,5000});")  # into a matrix of Eigen
@@ -65,9 +65,9 @@ class Code:
     """
 
     def __init__(self, text: str):
-        self.comments, self.docs = dict[int, str](), dict[int, str]()
+        self.comments = dict[int, str]()
         for block in _BLOCK.finditer(text):
-            self.docs |= enumerate(block[0].split("\n"), 1 + text.count("\n", 0, block.start()))
+            self.comments |= enumerate(block[0].split("\n"), 1 + text.count("\n", 0, block.start()))
         text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
         text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
@@ -582,9 +582,7 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     width = len(rows[0][1])
     lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
     typed = [code.orders[name] for name in code.fields.keys() & code.orders if re.search(rf"\b{name}\b", before)]
-    near = next(
-        (names for k in lines if (names := _columns_in([code.comments.get(k) or code.docs.get(k, "")], width))), []
-    )
+    near = next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
     used = _columns_in(
         [
             *map(",".join, typed),
@@ -671,7 +669,7 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
         name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c)?[\"']?$",
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[\d*\]\w+)?[\"']?$",
             group.before,
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
@@ -698,7 +696,7 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
     named: dict[str, list[str]] = {}
     header, line, places = dict[str, str](), 0, dict[str, tuple[int, str]]()
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
-        bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name))
+        bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
         names = (taken.get(name, "-"),) if taken else (name, bare, name.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
         if heading and heading.quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
@@ -737,8 +735,8 @@ _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
-    name = r"(?<![\"'\w])(?:DH_)?(alpha|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)_?(\d{1,2})\s*([:=])"
-    pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s][^,}}\n;:=!]*)"
+    name = r"(?<![\"'\w])(?:DH_)?(al(?:ph|f)a|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)_?(\d{1,2})\s*([:=])"
+    pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s](?:::|[^,}}\n;:=!])*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
     for each in re.finditer(
         pattern, re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I

@@ -15,9 +15,9 @@ _JOINT = words_of(
     "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
-    "a=a r=a l=a d=d q=theta v=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha alph=alpha "
-    "al=alpha offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset θoff=offset thetaoff=offset "
-    "type=type jointtype=type sigma=type σ=type 类型=type"
+    "a=a r=a l=a d=d q=theta v=theta phi=theta φ=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha "
+    "alph=alpha al=alpha offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset θoff=offset "
+    "thetaoff=offset type=type jointtype=type sigma=type σ=type 类型=type"
 )
 _WORDS = words_of(
     "angleoffset=offset thetaoffset=offset offsettheta=offset θoffset=offset θ,offset=offset theta,offset=offset "

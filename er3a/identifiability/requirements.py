@@ -55,21 +55,21 @@ class SoughtExtreme:
         -------
         extreme : mm
         """
-        ends = np.sort(np.stack([table.lower[0], table.upper[0]]), axis=0)
+        ends = np.sort([table.lower[0], table.upper[0]], axis=0)
         lower, upper = ends[:, self.joints]
         count, climbs = AFRESH if self.q is None else FOLLOWED
         points = box_points(lower, upper, count)
         if self.q is not None:
             points = np.concatenate([np.clip(self.q[self.joints], lower, upper)[None], points])
-        q, value = peak(
+        q, values = peak(
             lambda q: self.sign * self.quantity.measure(frames_of(table, self.robot, self._whole(q)))[0],
             lower,
             upper,
             points,
             climbs,
         )
-        self.q = self._whole(q)
-        return self.sign * value * quantities.MM
+        self.q = self._whole(q[0])
+        return self.sign * float(values[0]) * quantities.MM
 
     def _whole(self, q: Reals) -> Reals:
         whole = np.zeros((*q.shape[:-1], self.robot.joints))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.comparison.compare import shift_between, turn_between, worst_pose
+from er3a.comparison.compare import shift_between, turn_between, worst_poses
 from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
 from er3a.diagnosis.faults import SIDES, entry_of
 from er3a.diagnosis.ranking import usable
@@ -246,7 +246,7 @@ class ToolRange:
             one, there = self._tool(both, q)
             return one, there
 
-        mm, rad = (worst_pose(off, tools, self.robot)[0] for off in (shift_between, turn_between))
+        mm, rad = (worst_poses(off, tools, self.robot)[0][0] for off in (shift_between, turn_between))
         return ToolOff(MM * mm, float(np.degrees(rad)))
 
     def signature(self, tables: Tables) -> Reals:

@@ -59,7 +59,8 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
 
 
 def forward_of_rows(robot: Robot, u: Reals) -> Reals:
-    """Poses of the tool point for the motion of the table's rows, before any coupling.
+    """Poses of the tool point for the motion of the table's rows, before any coupling; not compiled, so that searches
+    that rest on them go the same way in every process.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def forward_of_rows(robot: Robot, u: Reals) -> Reals:
     T : (N, 4, 4), T_base_tool, m
     """
     out = np.empty((len(u), 4, 4))
-    _fill_poses(for_kernel(u), joints_for_blocks(robot), constant_links(robot), out)
+    _forward_by_arrays(for_kernel(u), joints_for_blocks(robot), constant_links(robot), out)
     return out
 
 
@@ -346,9 +347,10 @@ def _forward(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
 
 @np.errstate(all="ignore")  # as kernels have it
 def _forward_by_arrays(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
-    """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow."""
+    """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow. No product is BLAS's,
+    whose last bit depends on the number of threads."""
     out[:] = links[0]
-    entries, (x, y, z, place) = out.reshape(-1, 4), np.moveaxis(out, 2, 0)
+    x, y, z, place = np.moveaxis(out, 2, 0)
     for k, link in enumerate(links[1:]):
         u = joint[_SIGN, k] * q[:, k, None]
         if joint[_SLIDES, k]:
@@ -356,7 +358,7 @@ def _forward_by_arrays(q: Reals, joint: Reals, links: Reals, out: Reals) -> None
         else:
             cosine, sine = np.cos(u + joint[_START, k]), np.sin(u + joint[_START, k])
             x[:], y[:] = cosine * x + sine * y, cosine * y - sine * x
-        entries[:] = entries @ link
+        out[:] = np.einsum("nij,jk->nik", out, link)
     out[:, 3] = 0.0, 0.0, 0.0, 1.0
 
 

@@ -19,7 +19,7 @@ from er3a.robots.robot import Robot
 
 ORIENTATIONS = 2000  # a ratio of these is known to 1 %
 TURN_GRID, SHIFT_GRID = 41, 25  # changes across at first: 9 deg, and a twelfth of the arm's reach
-FINE_GRID, REFINEMENTS = 9, 5  # changes across when refined, each time to a quarter, and how often
+FINE_GRID, REFINEMENTS = 5, 10  # changes across when refined, each time to half, and how often
 
 
 SPARE_TURNS, SPARE_SHIFTS = np.radians([1.0, 2.0, 5.0, 10.0]), np.array([5.0, 10.0, 20.0, 50.0]) / 1000

@@ -46,7 +46,7 @@ def box_points(lower: Reals, upper: Reals, count: int = SCAN) -> Reals:
     return np.concatenate(points)
 
 
-def peak(function: Function, lower: Reals, upper: Reals, points: Reals, climbs: int = CLIMBS) -> tuple[Reals, float]:
+def peak(function: Function, lower: Reals, upper: Reals, points: Reals, climbs: int = CLIMBS) -> tuple[Reals, Reals]:
     """Where a function is largest in a box, by Newton's method from the best of given points.
 
     Parameters
@@ -58,12 +58,12 @@ def peak(function: Function, lower: Reals, upper: Reals, points: Reals, climbs: 
 
     Returns
     -------
-    at, value : (d,), and the function there; the largest that was found, not proven
+    at, values : maxima (K, d) and the function there (K,), the largest first; the largest that were found, not proven
     """
     starts = points[_best_apart(points, function(points), climbs)]
     ends, values = _climb(function, starts, lower, upper)
-    best = int(np.argmax(values))
-    return ends[best], float(values[best])
+    order = np.argsort(-values, kind="stable")
+    return ends[order], values[order]
 
 
 def _climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Reals, Reals]:

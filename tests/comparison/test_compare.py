@@ -23,7 +23,7 @@ from er3a.pipeline.cli import app
 from er3a.pipeline.messages.comparison import headline, layer_rows
 from er3a.robots.masses import LinkMass, MassBody, Masses
 from er3a.robots.robot import CombinedLimit
-from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, random_arm, with_wrong_entries
+from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, pose, random_arm, with_wrong_entries
 from testing.arms import made_of
 from testing.published_tables import PAIRS, best_alignment_mm, urdf_flange, urdf_path, write_csv
 from testing.readme import README
@@ -747,3 +747,15 @@ def test_the_one_chain_of_a_urdf_with_as_many_joints_as_the_table_is_taken(tmp_p
     path = tmp_path / "two_ends.urdf"
     path.write_text(f'<robot name="two_ends">{links}{made}</robot>')
     assert tip_after(path, None, joints) == tip
+
+
+@pytest.mark.parametrize("names", [("irb1600_6_12", "irb2400"), ("puma560", "irb140")])
+def test_the_alignment_found_is_the_least_wherever_the_search_begins(names):
+    """Base, flange and zeros are free, and the last bit of a number says nothing: the distance left is the same."""
+    one, other = map(er3a.load_robot, names)
+    random = np.random.default_rng(1)
+    zeros = other.offset + random.uniform(-3, 3, 6) * other.direction
+    elsewhere = other.replace(base=pose(random) @ other.base, flange=other.flange @ pose(random), offset=zeros)
+    pairs = [(one, other), (one.replace(a=one.a * (1 + 1e-15)), other), (one, elsewhere)]
+    left = [er3a.compare(*pair).aligned_mm for pair in pairs]
+    np.testing.assert_allclose(left, left[0], rtol=1e-3)

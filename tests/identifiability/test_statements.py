@@ -79,6 +79,6 @@ def test_the_shipped_robots_are_themselves(name):
 def test_a_peak_inside_the_limits_is_found_from_each_of_their_corners():
     lower, upper, top = np.array([-1.0, -2.0, 0.0]), np.array([1.0, 0.5, 2.0]), np.array([0.3, -0.4, 1.1])
     for corner in np.stack(np.meshgrid(*zip(lower, upper)), axis=-1).reshape(-1, 3):
-        at, value = peak(lambda q: 3.0 - ((q - top) ** 2).sum(axis=1), lower, upper, corner[None])
-        np.testing.assert_allclose(at, top, atol=1e-4)
-        assert value == pytest.approx(3.0)
+        at, values = peak(lambda q: 3.0 - ((q - top) ** 2).sum(axis=1), lower, upper, corner[None])
+        np.testing.assert_allclose(at, [top], atol=1e-4)
+        assert values == pytest.approx([3.0])

@@ -798,3 +798,28 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         read(tmp_path, text)
     content, _ = read(tmp_path, text, columns=columns.split(), length_unit="m", angle_unit="rad")
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "var Arm = Params{\n\tThetaOffsets: []float64{0, -math.Pi / 2},\n\tAlphaValues: []float64{-math.Pi / 2, 0},\n"
+        "\tAValues: []float64{0, 270},\n\tDValues: []float64{290, 0},\n}\n",
+        "alphas = [-np.pi/2, 0]\na_vals = [0, 270]\nd_values = [290, 0]\ntheta_offsets = [0, -np.pi/2]\n",
+        "double a1=0,alpha1=-std::numbers::pi/2,d1=290,offset1=0;\n"
+        "double a2=270,alpha2=0,d2=0,offset2=-std::numbers::pi/2;\n",
+        '"""Matrices (rx, tx, rz, tz) aka (alpha, a, theta, d)"""\n\n\n\n\n\n\ndef arm():\n    return np.array([\n'
+        "        [-np.pi/2, 0, 0, 290],\n        [0, 270, -np.pi/2, 0]\n    ])\n",
+        r"| i | $\alpha_i$ | $a_i$ | $d_i$ | $\phi_i$ |"
+        "\n|--|--|--|--|--|\n"
+        r"| 1 | $-\frac{\pi}{2}$ | 0 | 290 | $\theta_1$ |"
+        "\n"
+        r"| 2 | 0 | 270 | 0 | $\theta_2 - \frac{\pi}{2}$ |",
+        "| i | a (mm) | alpha (deg) | d (mm) | offset (deg) | note |\n|--|--|--|--|--|--|\n"
+        "| 1 | 0 | -90 | 290 | 0 | As given: theta=0, alpha=-90deg, d=L1, a=0. |\n"
+        "| 2 | 270 | 0 | 0 | -90 | As given: theta=-90deg, alpha=0, d=0, a=L2. |\n",
+    ],
+)
+def test_names_and_places_that_programs_give_a_table_are_read(tmp_path, text):
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-6)
