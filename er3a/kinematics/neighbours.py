@@ -19,7 +19,7 @@ from er3a.robots.robot import Robot
 
 ORIENTATIONS = 2000  # a ratio of these is known to 1 %
 TURN_GRID, SHIFT_GRID = 41, 25  # changes across at first: 9 deg, and a twelfth of the arm's reach
-FINE_GRID, REFINEMENTS = 5, 10  # changes across when refined, each time to half, and how often
+FINE_GRID, REFINEMENTS = 9, 5  # changes across when refined, each time to a quarter, and how often
 
 
 SPARE_TURNS, SPARE_SHIFTS = np.radians([1.0, 2.0, 5.0, 10.0]), np.array([5.0, 10.0, 20.0, 50.0]) / 1000
@@ -36,8 +36,9 @@ Usable = Callable[[Reals], Flags]
 class Neighbours:
     """Poses near a refused one that have a solution within the limits.
 
-    The smallest turn is searched over a grid of all turns, if some orientation has a solution at all; the smallest
-    shift over one that spans the arm. Both grids are refined around their best point, so both are upper bounds.
+    The smallest turn is searched over a grid of all turns, for advice only if one of the orientations that are tried is
+    usable; the smallest shift over one that spans the arm. Both grids are refined around their best point, so both are
+    upper bounds.
 
     Attributes
     ----------
@@ -100,12 +101,14 @@ def neighbours(robot: Robot, T: Reals, usable: Usable | None = None) -> Neighbou
         return poses
 
     half = size_of(robot) + float(np.linalg.norm(robot.last_to_tool[:3, 3]))
-    ratio = float(solvable(robot, _turned(T, _orientations())).mean())
-    turn = _least(robot, turned, (np.zeros(3), np.pi, TURN_GRID), usable, SPARE_TURNS) if ratio else None
+    spread = _turned(T, _orientations())
+    solved = solvable(robot, spread)
+    turns = usable is None or solvable(robot, spread[solved], usable).any()
+    turn = _least(robot, turned, (np.zeros(3), np.pi, TURN_GRID), usable, SPARE_TURNS) if turns else None
     shift = _least(robot, shifted, (robot.base[:3, 3] - T[:3, 3], half, SHIFT_GRID), usable, SPARE_SHIFTS)
     back = None if turn is None else scipy.spatial.transform.Rotation.from_matrix(turn[:3, :3] @ T[:3, :3].T)
     return Neighbours(
-        orientation_ratio=ratio,
+        orientation_ratio=float(solved.mean()),
         least_turn=None if back is None else float(back.magnitude()),
         turned_to=None if turn is None else rpy_of(turn),
         least_shift=None if shift is None else float(np.linalg.norm(shift[:3, 3] - T[:3, 3])),
