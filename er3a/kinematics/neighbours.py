@@ -10,10 +10,8 @@ import numpy as np
 import scipy
 
 from er3a.geometry.transforms import rpy_of, transform
-from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
@@ -42,7 +40,7 @@ class Neighbours:
 
     Attributes
     ----------
-    orientation_ratio : part of 2000 tool orientations, spread evenly, that have a solution at the target's position
+    orientation_ratio : part of 2000 random tool orientations that have a solution at the target's position
     least_turn : rad, smallest rotation of the tool found that has one, position kept; None if none has
     turned_to : (3,), rad, roll, pitch and yaw where that turn ends; None if none has
     least_shift : m, smallest shift of the tool found that has one, orientation kept; None if none has
@@ -118,11 +116,8 @@ def neighbours(robot: Robot, T: Reals, usable: Usable | None = None) -> Neighbou
 
 @cache
 def _orientations() -> Reals:
-    """Rotations (ORIENTATIONS, 3, 3), spread evenly (Shoemake's way from a cube to all quaternions)."""
-    share, first, second = quasi_random_points(np.zeros(3), np.array([1, TURN, TURN]), ORIENTATIONS).T
-    a, b = np.sqrt(1 - share), np.sqrt(share)
-    quaternions = np.stack([a * np.sin(first), a * np.cos(first), b * np.sin(second), b * np.cos(second)], axis=1)
-    return np.asarray(scipy.spatial.transform.Rotation.from_quat(quaternions).as_matrix())
+    """Random rotations (ORIENTATIONS, 3, 3), the same for all poses."""
+    return np.asarray(scipy.spatial.transform.Rotation.random(ORIENTATIONS, rng=np.random.default_rng(0)).as_matrix())
 
 
 def _turned(T: Reals, turns: Reals) -> Reals:
@@ -149,7 +144,7 @@ def _least(
         ticks = np.linspace(-half, half, count)
         changes = centre + np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
         changes = changes[np.linalg.norm(changes, axis=1).argsort(kind="stable")]
-        parts = np.split(changes, CHUNKS[CHUNKS < len(changes)])
+        parts = np.split(changes, CHUNKS[len(changes) > CHUNKS])
         solved = (part[solvable(robot, made(part), usable)] for part in parts)
         best = next((part[0] for part in solved if len(part)), None)
         if best is None:

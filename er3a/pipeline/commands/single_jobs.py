@@ -75,18 +75,20 @@ def views(
     loaded.entry(robot)
     named = [_known(page, (*STAGES, TEACH)) for page in pages or loaded.pages(robot)]
     stages = [STAGES[page] for page in named if page != TEACH]
+
+    def show(verb: str, stage: str, kind: str) -> None:
+        view = reports / robot / f"{stage}.{kind}"
+        run.show(verb, stage, loaded, robot, results / robot / stage, view)
+        write_checksum(view)
+
     with language.using("en"):
         for stage in stages:  # first: pages show their pictures where there is no WebGL
             if "record" in stage.views:
-                recording = reports / robot / f"{stage.name}.rrd"
-                run.show("record", stage.name, loaded, robot, results / robot / stage.name, recording)
-                write_checksum(recording)
-                write_checksum(recording.with_suffix(".webp"))
+                show("record", stage.name, "rrd")
+                write_checksum(reports / robot / f"{stage.name}.webp")
     with house_style():
         for stage in stages:
-            page = reports / robot / f"{stage.name}.html"
-            run.show("report", stage.name, loaded, robot, results / robot / stage.name, page)
-            write_checksum(page)
+            show("report", stage.name, "html")
     if TEACH in named:
         _write_teach_page(loaded, robot, results, reports)
 
