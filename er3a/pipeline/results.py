@@ -269,7 +269,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
         absent = AbsentResults(summary)
         origin = adapter(Provenance).validate_python(record["provenance"])
         return Stored(record["robot"], stage.name, origin, absent, rests_on, folder)
-    return replace(read_results(folder, stage.module("model").RESULTS), rests_on=rests_on, folder=folder)
+    return replace(read_results(folder, stage.module("model").RESULTS, record), rests_on=rests_on, folder=folder)
 
 
 def is_computed(folder: Path) -> bool:
@@ -286,16 +286,22 @@ def is_computed(folder: Path) -> bool:
     return (folder / SUMMARY).is_file()
 
 
-def read_results(folder: Path, kind: type[ResultsT]) -> Stored[ResultsT]:
+def read_results(folder: Path, kind: type[ResultsT], record: dict[str, Any] | None = None) -> Stored[ResultsT]:
     """Read the results of a stage that was computed.
+
+    Parameters
+    ----------
+    record : the summary as plain data, if it is read already; it is emptied, as with thousands of targets it is large
 
     Raises
     ------
     ResultError
         naming the file that is missing, damaged or of another format version
     """
-    record, sums = _record(folder), checksums(folder)
+    record = record or _record(folder)
+    sums, of = checksums(folder), (record["robot"], record["stage"])
     summary, provenance = _parsed(folder / SUMMARY, record, kind)
+    record.clear()
     tables = {}
     for name, table in table_types(kind).items():
         file = folder / f"{name}.parquet"
@@ -305,7 +311,7 @@ def read_results(folder: Path, kind: type[ResultsT]) -> Stored[ResultsT]:
             tables[name] = table.read(content)
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ResultError(file, f"damaged ({' '.join(str(error).split())})") from None
-    return Stored(record["robot"], record["stage"], provenance, kind(summary=summary, **tables))
+    return Stored(*of, provenance, kind(summary=summary, **tables))
 
 
 def _record(folder: Path) -> dict[str, Any]:
@@ -538,8 +544,8 @@ def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
 
 
 def _verdict_record(verdict: Verdict) -> dict[str, Any]:
-    more = {key: plain(value) for key in BESIDE if (value := getattr(verdict, key))}
-    return {"status": verdict.status, **plain(verdict.finding), **more}
+    more = {key: value for key in BESIDE if (value := getattr(verdict, key))}
+    return {"status": verdict.status, **opened_once(verdict.finding), **more}
 
 
 def _stored_finding(verdict: Mapping[str, Any]) -> dict[str, Any]:

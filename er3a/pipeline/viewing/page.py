@@ -296,7 +296,7 @@ def head_of(stored: Stored[Any]) -> Head:
         summary,
         checked,
         tuple(map(assumed_text, summary.assumed)),
-        condition_of(stored.folder.parent / "validation") if stored.folder else "",
+        condition_of(stored.validated),
     )
 
 

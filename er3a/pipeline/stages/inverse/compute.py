@@ -357,15 +357,19 @@ def compute(study: Study, name: str) -> model.InverseResults:
     margin = study.assumed_margin(name)
     assumed = shapes_assumed(robot, margin, {})
     clearance = margin if assumed else motion.penetration_tolerance_mm / 1000
-    many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()
+    many, advised, solved = len(targets) > MANY_TARGETS, 0, list[model.TargetResult]()
+    rows, ranked = list[model.SolutionRows](), list[model.RankingRows]()
     with shown_work(f"{name}: solving {len(targets)} targets"):
         for target in targets:
             advise = not many or advised < MAX_ADVISED
-            solved.append(solve_target(robot, target, scene, many=many, advise=advise, clearance=clearance))
-            advised += solved[-1].result.neighbours is not None
-    ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
-    solutions = model.SolutionRows.stacked(one.rows for one in solved).of_joints(robot.slides)
-    results = _with_clearance(robot, scene, [one.result for one in solved])
+            one = solve_target(robot, target, scene, many=many, advise=advise, clearance=clearance)
+            advised += one.result.neighbours is not None
+            solved.append(one.result)
+            if len(one.rows):  # thousands of tables without rows would fill the memory
+                rows.append(one.rows)
+                ranked.append(rankings(robot, target, one, scene, settings.mix))
+    solutions = model.SolutionRows.stacked(rows).of_joints(robot.slides)
+    results = _with_clearance(robot, scene, solved)
     asked = [each for each in results if each.chosen_deg is not None and each.expect in (None, "reached")]
     chosen = meant(robot, np.reshape([each.chosen_deg for each in asked], (-1, robot.joints)))
     T_of = {target.name: target.T for target in targets}
