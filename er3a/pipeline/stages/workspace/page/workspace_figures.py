@@ -141,7 +141,7 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
     seen = SeenArm(tr("From the side"), "", kind, arm, lines)
     far, height = outer[outer[:, 0].argmax()]
     below = low[1] - BELOW * far
-    labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far / 2]), kind))
+    labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far]), kind))
     over = dimension(far, below, height, kind)
     return side_view([seen], floor_mm, ratio=1.2, labels=labels, over=over)
 
