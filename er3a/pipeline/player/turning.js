@@ -94,7 +94,7 @@ function draw() {
   awaited = false;
   plane.constant = -low[1] - Number(knife.value) * size[1];
   space.begin();
-  space.floor(middle, size[0] / FLOOR, 0);
+  space.floor(middle, size[0] / FLOOR, data.floor);
   const shown = chosen();
   for (const { name, parts } of all) for (const part of parts) part.visible = !left.has(name);
   for (const each of solids.filter(({ name }) => !left.has(name))) {

@@ -77,26 +77,29 @@ FILLED = 0.32  # of the distance that holds the box's diagonal
 
 def turning_figure(
     layers: Sequence[Layer],
-    solids: Sequence[Solids] = (),
-    cut_m: float | None = None,
+    solids: Sequence[Solids],
+    cut_m: float,
+    floor_m: float,
 ) -> Markup:
     """The figure as HTML, one a page, whose head holds ``drawing_head``.
 
     Parameters
     ----------
     layers, solids : what is seen
-    cut_m : y of the plane that cuts layers open at first, m; None for the middle
+    cut_m : y of the plane that cuts layers open at first, m
+    floor_m : height of the grid, m
     """
     points = np.concatenate([layer.points_mm for layer in layers])
     low, high = points.min(axis=0), points.max(axis=0)
-    low[2] = min(low[2], 0.0)
+    low[2] = min(low[2], 1000 * floor_m)
     low, high = low - 50.0, high + 50.0
     data = {
         "box": [low.tolist(), high.tolist()],
         "azimuth": float(np.radians(AZIMUTH_DEG)),
         "elevation": float(np.radians(ELEVATION_DEG)),
         "filled": FILLED,
-        "cut": 0.5 if cut_m is None else float((1000 * cut_m - low[1]) / (high[1] - low[1])),
+        "floor": floor_m,
+        "cut": float((1000 * cut_m - low[1]) / (high[1] - low[1])),
         "solids": [{**vars(each), "shapes": list(each.shapes), "poses": each.poses.tolist()} for each in solids],
         "layers": [_layer(layer, low, high) for layer in layers],
     }
