@@ -62,10 +62,10 @@ function made(layer) {
   return { ...layer, points, parts };
 }
 
-function cloud({ colour, width, cut }, points) {
+function cloud({ colour, cut }, points) {
   const geometry = new three.BufferGeometry();
   geometry.setAttribute("position", new three.Float32BufferAttribute(points.flat(), 3));
-  const look = { color: colour, size: width, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] };
+  const look = { color: colour, size: 2, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] };
   return [new three.Points(geometry, new three.PointsMaterial(look))];
 }
 

@@ -26,7 +26,7 @@ from er3a.workspace.voids import Blocks
 from er3a.workspace.voids import mesh as surface_of
 
 REACHED = "#9ecae1"
-ASIDE = (0.12, 0.2)  # of the reach, from a void before axis 1 to its name
+ASIDE = (0.12, 0.28)  # of the reach, from a void before axis 1 to its name
 BELOW = 0.08  # of the reach, from what is reached down to its dimension
 
 
@@ -136,12 +136,10 @@ def labelled(arms: Sequence[tuple[Robot, model.WorkspaceResults, Kind]], floor_m
         lines = border_lines(border.arc, border.rho_m, border.z_m)
         seen.append(SeenArm(own_title(robot.title), "", kind, arm, lines))
         outer = np.concatenate(lines)
-        low, high = outer.min(axis=0), outer.max(axis=0)
-        for number_, void in enumerate(summary.voids, 1):
-            if void.kind == "enclosed" and kind == "right":
-                labels.append(void_label(number_, void, high))
+        if kind == "right":
+            labels += void_labels(summary)
         far, height = outer[outer[:, 0].argmax()]
-        below = low[1] - BELOW * far
+        below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far]), kind))
         over += dimension(far, below, height, kind)
     return side_view(seen, floor_mm, ratio=UPRIGHT if arms[1:] else 1.2, labels=labels, over=over)
@@ -162,14 +160,14 @@ def void_name(number_: int, void: model.VoidSummary) -> str:
     return tr(VOID_NAMES[void.kind], number=number_)
 
 
-def void_label(number_: int, void: model.VoidSummary, size: Reals) -> Label:
-    """The word for a void, led to it from its side; a list says how large it is.
-
-    Parameters
-    ----------
-    size : (2,), mm, of what is reached from axis 1 on: forward, up
-    """
-    low, high = void.low_m[0], void.high_m[0]
-    across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
-    at = 1000 * np.array([across, void.centroid_m[2]])
-    return Label(tr("void"), at + size * ASIDE, "hole", f"hole-{number_}", at)
+def void_labels(summary: model.WorkspaceSummary) -> list[Label]:
+    """A word for each void all around axis 1, led to it from its side; a list says how large it is."""
+    labels = []
+    for number_, void in enumerate(summary.voids, 1):
+        low, high = void.low_m[0], void.high_m[0]
+        across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
+        start = 1000 * np.array([across, void.centroid_m[2]])
+        at = start + 1000 * summary.reach_m.furthest_from_axis * np.array(ASIDE)
+        if void.kind == "enclosed":
+            labels.append(Label(tr("void"), at, "hole", f"hole-{number_}", start, written_there=True))
+    return labels
