@@ -140,7 +140,7 @@ def labelled(arms: Sequence[tuple[Robot, model.WorkspaceResults, Kind]], floor_m
             labels += void_labels(summary)
         far, height = outer[outer[:, 0].argmax()]
         below = outer[:, 1].min() - BELOW * far
-        labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far]), kind))
+        labels.append(Label(reaches(summary), np.array([-far / 5, below - BELOW * far]), kind))
         over += dimension(far, below, height, kind)
     return side_view(seen, floor_mm, ratio=UPRIGHT if arms[1:] else 1.2, labels=labels, over=over)
 
