@@ -152,14 +152,14 @@ def test_what_a_row_of_the_index_leads_to_has_the_whole_answer_in_one_screen(bro
     """Verdict, cause, what to do instead, and the arm at that moment."""
     with chromium.emulating(browser, width=1400, height=1000):
         browser.get((small_study.folder / "reports/index.html").as_uri())
-        link = browser.find_element(By.CSS_SELECTOR, '.tile a[href*="play=line_wrist&"]')
+        link = browser.find_element(By.CSS_SELECTOR, '.tile a[href*="play=line_collides&"]')
         browser.get(link.get_attribute("href"))
         WebDriverWait(browser, PAUSE).until(
             lambda _: browser.execute_script("return performance.getEntriesByName('player').length")
         )
         told = browser.find_element(By.CSS_SELECTOR, ".player .now-shown").text
-        assert "singular" in told
-        assert browser.find_element(By.CSS_SELECTOR, ".runs [aria-current] b").text == "line_wrist"
+        assert "post" in told
+        assert browser.find_element(By.CSS_SELECTOR, ".runs [aria-current] b").text == "line_collides"
         for part in ("h1", ".player canvas", ".player .now-shown", ".fix", ".runs"):
             top, bottom = browser.execute_script(
                 "const { top, bottom } = document.querySelector(arguments[0]).getBoundingClientRect();"

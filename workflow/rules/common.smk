@@ -152,9 +152,15 @@ def rested_on():
 
 
 def shown_by(robot):
-    """The results that the pages of a robot show: its own, and verdicts on tables to use instead of the robot's."""
+    """The results that the pages of a robot show: its own, and of tables to use instead verdicts and reach."""
     tables = STUDY.other_tables(robot) if "validation" in asked_stages(robot) else []
     return [
         *(path for stage in asked_stages(robot) for path in results_of(robot, stage)),
         *(f"results/{other}/validation/summary.json" for other in tables),
+        *(
+            path
+            for other in tables
+            if "workspace" in set(asked_stages(robot)) & set(asked_stages(other))
+            for path in results_of(other, "workspace")
+        ),
     ]

@@ -41,14 +41,17 @@ def glance(results: object) -> Glance:
 def _(results: ValidationResults) -> Glance:
     summary = results.summary
     counts, evidence = summary.counts.independent, summary.evidence
-    bad, open_ = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
-    known = known_alone(evidence) if evidence else 0
     value = f"{counts.passed}/{counts.total}" if counts.total else "–"
     if summary.verdict.status == "fail":
+        bad = evidence.contradicted if evidence else 0
         return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
-    if summary.conflicts:
-        return value, tr("sources disagree")
-    return value, tr("{count} of {all} settled", count=known - open_, all=known) if open_ else ""
+    for conflict in summary.conflicts[:1]:
+        stated = [each.expected for each in conflict.statements]
+        return value, tr("sources differ by {off}", off=with_unit(fixed(max(stated) - min(stated), 1), conflict.unit))
+    if not evidence or not evidence.unconfirmed:
+        return value, ""
+    known = known_alone(evidence)
+    return value, tr("{count} of {all} settled", count=known - len(evidence.unconfirmed), all=known)
 
 
 @glance.register

@@ -11,7 +11,7 @@ from typing import Any
 from er3a.files.kept_files import write_text
 from er3a.finding import is_one
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.workspace import reaches
 from er3a.pipeline.overview.glances import glance
@@ -22,6 +22,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.validation.page.evidence_section import to_confirm
 from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
+from er3a.pipeline.stages.workspace.page.workspace_figures import void_labels
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
@@ -111,8 +112,10 @@ def _changed_text(verdicts: Sequence[StageVerdict], robot: str) -> str:
         return ""
     named = [tr(each) if each in (THE_SETTINGS, THE_CODE) else each for each in names[:MAX_CHANGED]]
     more = ["…"] if len(names) > MAX_CHANGED else []
-    text = N_("Changed since, so what stands here tells of what was before (run the study again): {names}.")
-    return tr(text, names=joined([*named, *more], ", "))
+    return tr(
+        "Changed since, so what stands here tells of what was before (run the study again): {names}.",
+        names=joined([*named, *more], ", "),
+    )
 
 
 def _computed(study: Study, name: str, folder: Path) -> Results:
@@ -177,9 +180,10 @@ def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Resul
     """The arm that may be relied on, with its voids, and over it the wrong one."""
     name = drawn[0].name
     floor = floor_of(study.scene(name, "trajectory"))
-    floor_mm = None if floor is None else 1000 * floor
+    floor_mm = floor and 1000 * floor
     seen = [_seen(study, entry.name, entry.use, stored[entry.name]) for entry in drawn]
-    labels = []
+    reach = _reach(stored[name])
+    labels = void_labels(reach) if reach else []
     for arm in seen:
         lowest = arm.points_mm[arm.points_mm[:, 1].argmin()]
         if floor_mm is not None and lowest[1] < floor_mm:
@@ -230,5 +234,4 @@ def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Map
 def _write_marks(entries: Sequence[RobotRow], file: Path) -> None:
     """What each stage of each robot came to, for the marks in the headers of their pages."""
     marks = {entry.name: {cell.stage: cell.status for cell in entry.cells if cell} for entry in entries}
-    text = f"globalThis.MARKS = {json.dumps(marks, sort_keys=True)};\n"
-    write_text(file, text)
+    write_text(file, f"globalThis.MARKS = {json.dumps(marks, sort_keys=True)};\n")

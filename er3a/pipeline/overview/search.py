@@ -68,12 +68,14 @@ def places(
 ) -> Iterator[tuple[str, str, list[tuple[str, list[str]]]]]:
     """Of each page that is there its address, its title, and by heading all of its text; a title says which robots'
     tables evidence contradicts."""
-    pages = [(name, stage) for name in study.names for stage in study.pages(name)]
-    warned = {name: tr("never use this table") if name in contradicted else "" for name in study.names}
-    titles = {name: bracketed(own_title(study.robot(name).title), warned[name]) for name in study.names}
+    titles = {
+        name: bracketed(own_title(study.robot(name).title), tr("never use this table") if name in contradicted else "")
+        for name in study.names
+    }
     named = {
         f"{name}/{stage}.html": tr("{robot}: {page}", robot=titles[name], page=tr(PAGES[stage]))
-        for name, stage in pages
+        for name in study.names
+        for stage in study.pages(name)
     }
     if study.article:
         named["article.html"] = tr("The article, item by item")

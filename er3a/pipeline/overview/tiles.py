@@ -31,7 +31,7 @@ class Tile:
     """A question, its picture, and its answer, which leads to the page.
 
     ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``, ``rows``, ``drawing``: what is
-    shown, one of them; ``more``: how many rows are left to the page.
+    shown, one of them; ``more``: rows that are left to the page.
     """
 
     title: str
@@ -41,7 +41,7 @@ class Tile:
     address: str
     entries: Mapping[str, Any] | None = None
     rows: Sequence[ListRow] = ()
-    more: int = 0
+    more: Sequence[ListRow] = ()
     drawing: str = ""
 
 
@@ -83,18 +83,13 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     programs = isinstance(results, ProgramsResults)
     said = programs_answer(robot, results) if programs else paths_answer(robot, results)
     title = tr("Which programs pass?") if programs else tr("Which paths pass?")
-    sound: Mark = "pass" if found.results.summary.verdict.status == "pass" else "caution"
-    rows = [row for group in said.groups for row in group.rows]
-    few = _few(rows)
-    address = f"{name}/{found.stage}.html"
-    return Tile(title, said.headline, said.rest, sound, address, rows=few, more=len(rows) - len(few))
-
-
-def _few(rows: Sequence[ListRow]) -> list[ListRow]:
-    """The first rows of both kinds: half of them may not run, or more where few may."""
+    sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
+    rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
     good = [row for row in rows if row.mark == "pass"]
-    bad = [row for row in rows if row.mark != "pass"][: max(FEW // 2, FEW - len(good))]
-    return [*bad, *good[: FEW - len(bad)]]
+    bad = [row for row in rows if row not in good][: max(FEW // 2, FEW - len(good))]
+    few = [*bad, *good[: FEW - len(bad)]]  # half of them may not run, or more where few may
+    more = [row for row in rows if row not in few]
+    return Tile(title, said.headline, said.rest, sound, f"{name}/{found.stage}.html", rows=few, more=more)
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:

@@ -4,7 +4,7 @@
  */
 
 import { add, column, scaled, subtract } from "er3a/algebra";
-import { Space, surface } from "er3a/space";
+import { ARM, Space, alongArm, surface } from "er3a/space";
 import three from "er3a/three";
 
 const STEPS = 65535; // that the box is divided into
@@ -62,10 +62,10 @@ function made(layer) {
   return { ...layer, points, parts };
 }
 
-function cloud({ colour, width, cut }, points) {
+function cloud({ colour, cut }, points) {
   const geometry = new three.BufferGeometry();
   geometry.setAttribute("position", new three.Float32BufferAttribute(points.flat(), 3));
-  const look = { color: colour, size: width, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] };
+  const look = { color: colour, size: 2, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] };
   return [new three.Points(geometry, new three.PointsMaterial(look))];
 }
 
@@ -92,18 +92,18 @@ function body({ faces, colour, cut }, points) {
 
 function draw() {
   awaited = false;
-  const at = low[1] + (Number(knife.value) / Number(knife.max)) * size[1];
-  plane.constant = -at;
+  plane.constant = -low[1] - Number(knife.value) * size[1];
   space.begin();
-  space.floor(middle, size[0] / FLOOR, 0);
+  space.floor(middle, size[0] / FLOOR, data.floor);
   const shown = chosen();
   for (const { name, parts } of all) for (const part of parts) part.visible = !left.has(name);
   for (const each of solids.filter(({ name }) => !left.has(name))) {
     const hiding = each.poses.length === 1 ? space.hiding(each.parts, solids[0].poses) : new Set();
     space.place(each.parts, each.poses, new Map(), (part) => each !== shown && (each.address !== "" || hiding.has(part)));
   }
-  for (const each of all.filter(({ name, address }) => address && !left.has(name)).sort((a, b) => (b === shown) - (a === shown))) {
-    space.word(each.name, placeOf(each), each === shown ? space.page.accent : space.page.ink, each === shown);
+  if (shown && !left.has(shown.name)) {
+    space.keepClear([...alongArm(solids[0].poses), ...(shown.points ?? [placeOf(shown)])], ARM * size[0]);
+    space.word(shown.name, placeOf(shown), space.page.accent);
   }
   space.end();
   place.toggleAttribute("data-drawn", true);

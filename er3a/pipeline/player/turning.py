@@ -16,7 +16,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.viewing.drawn import SCENE_COLOUR, drawn_arm, drawn_scene, poses_at
 from er3a.pipeline.viewing.page import page_environment
-from er3a.pipeline.viewing.palette import BODY, INK, rgb
+from er3a.pipeline.viewing.palette import BODY, rgb
 from er3a.pipeline.viewing.still import Still
 from er3a.robots.robot import Robot
 
@@ -33,7 +33,6 @@ class Layer:
     name : what the figure's key calls it
     points_mm : (N, 3)
     colour : ``#rrggbb``
-    width : px, of the squares at the points of what is no surface
     faces : (M, 3), points of each triangle of a surface, counter-clockwise from outside
     cut : whether the plane that a reader moves cuts it open
     address : by which a list leads to it
@@ -41,8 +40,7 @@ class Layer:
 
     name: str
     points_mm: Reals
-    colour: str = INK
-    width: float = 2.0
+    colour: str
     faces: Integers | None = None
     cut: bool = False
     address: str = ""
@@ -77,26 +75,29 @@ FILLED = 0.32  # of the distance that holds the box's diagonal
 
 def turning_figure(
     layers: Sequence[Layer],
-    solids: Sequence[Solids] = (),
-    cut_m: float | None = None,
+    solids: Sequence[Solids],
+    cut_m: float,
+    floor_m: float,
 ) -> Markup:
     """The figure as HTML, one a page, whose head holds ``drawing_head``.
 
     Parameters
     ----------
     layers, solids : what is seen
-    cut_m : y of the plane that cuts layers open at first, m; None for the middle
+    cut_m : y of the plane that cuts layers open at first, m
+    floor_m : height of the grid, m
     """
     points = np.concatenate([layer.points_mm for layer in layers])
     low, high = points.min(axis=0), points.max(axis=0)
-    low[2] = min(low[2], 0.0)
+    low[2] = min(low[2], 1000 * floor_m)
     low, high = low - 50.0, high + 50.0
     data = {
         "box": [low.tolist(), high.tolist()],
         "azimuth": float(np.radians(AZIMUTH_DEG)),
         "elevation": float(np.radians(ELEVATION_DEG)),
         "filled": FILLED,
-        "cut": 0.5 if cut_m is None else float((1000 * cut_m - low[1]) / (high[1] - low[1])),
+        "floor": floor_m,
+        "cut": float((1000 * cut_m - low[1]) / (high[1] - low[1])),
         "solids": [{**vars(each), "shapes": list(each.shapes), "poses": each.poses.tolist()} for each in solids],
         "layers": [_layer(layer, low, high) for layer in layers],
     }
@@ -124,7 +125,7 @@ def _still(layers: Sequence[Layer], solids: Sequence[Solids], data: dict[str, An
         if layer.faces is not None:
             picture.surface(points, layer.faces, layer.colour, 0.3 if layer.cut else 1.0)
         else:
-            picture.points(points, np.tile(rgb(layer.colour), (len(points), 1)) / 255, layer.width)
+            picture.points(points, np.tile(rgb(layer.colour), (len(points), 1)) / 255, 2.0)
     return picture.markup()
 
 
@@ -134,7 +135,6 @@ def _layer(layer: Layer, low: Reals, high: Reals) -> dict[str, Any]:
         "name": layer.name,
         "points": _packed(places, "<u2"),
         "colour": layer.colour,
-        "width": layer.width,
         "cut": layer.cut,
         "address": layer.address,
     }

@@ -55,7 +55,7 @@ def _hindered(placing: Placing) -> Markup:
                 address_of(stage, name, each.t, "player"), page.breakable(name), each.body
             )
             (named if name in hindered.get(stage, ()) else others).append(link)
-    first = page.whole_sentence(placing.hindrance(here, most=0))
+    first = page.whole_sentence(placing.hindrance)
     texts = [escape(first), *_sentence(named), *_sentence(others, tr("Others that meet it")), escape(placing.compared)]
     return Markup(" ").join(texts)
 
@@ -159,10 +159,8 @@ def _placement_context(placement: model.Placement) -> dict[str, Any]:
         return {"nowhere": say(placement)}
     return {
         "nowhere": "",
-        "placing_scene": placement.scene,
         "placing_margin": fixed(placement.margin_mm, 0),
         "stands": [stand_text(stand, placement) for stand in placement.stands],
-        "points_serving": placement.points_serving,
     }
 
 

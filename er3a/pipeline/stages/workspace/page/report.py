@@ -7,24 +7,21 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from er3a.collision.scene import Scene
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
-from er3a.pipeline.results import Stored, is_computed, read_stage
-from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
-from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
+from er3a.pipeline.stages.workspace.page.tray import Placing, found_by, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow
-from er3a.pipeline.viewing.page import render_stage, whole_sentence
+from er3a.pipeline.viewing.page import alternative_table, render_stage, whole_sentence
 from er3a.pipeline.viewing.side_view import Kind
-from er3a.robots.robot import Robot
 
 
 def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
@@ -32,9 +29,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "capability")
     contradicted = stored.rests_on.get("validation") == "fail"
-    placing = placing_of(study, stored)
-    folder = stored.folder.parent / "dynamics" if stored.folder else None
-    known = read_stage(folder, STAGES["dynamics"]).results.summary if folder and is_computed(folder) else None
+    placing, masses = placing_of(study, stored), found_by(stored, "dynamics")
+    known = masses.results.summary if masses else None
     there = tr("What the arm can carry at the tray was not examined.")
     payload = joined([payload_text(known, robot), there], " ") if placing else ""
     trays = [each.tray for each in placing.tried] if placing else []
@@ -46,7 +42,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         stored,
         output,
         _answer(summary, placing, [] if known else [payload_key(known, robot)]),
-        labelled=_labelled(robot, results, scene, "wrong" if contradicted else "right"),
+        labelled=_labelled(study, stored, contradicted),
+        at_side=contradicted,
         turning=workspace_figures.in_space(robot, results, scene, trays),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
@@ -54,13 +51,19 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     )
 
 
-def _labelled(robot: Robot, results: model.WorkspaceResults, scene: Scene | None, kind: Kind) -> Markup | None:
-    """The arm in what it reaches, with names; None of an arm that slides along its first axis."""
-    if results.summary.proof.bars or results.summary.is_flat:
+def _labelled(study: Study, stored: Stored[model.WorkspaceResults], contradicted: bool) -> Markup | None:
+    """The arm in what it reaches, with names, and where it is contradicted the one to use instead; None of an arm that
+    slides along its first axis."""
+    kind: Kind = "wrong" if contradicted else "right"
+    arms = [(study.robot(stored.robot), stored.results, kind)]
+    instead = alternative_table(study, stored) if contradicted else None
+    if instead and (right := found_by(stored, "workspace", f"../{instead}")):
+        arms.insert(0, (study.robot(instead), right.results, "right"))
+    if any(each.summary.proof.bars or each.summary.is_flat for _, each, _ in arms):
         return None
-    floor = floor_of(scene)
-    floor_mm = None if floor is None else 1000 * (floor - float(robot.base[2, 3]))
-    return workspace_figures.labelled(robot, results, floor_mm, kind)
+    floor = floor_of(study.scene(stored.robot, "capability"))
+    floor_mm = None if floor is None else 1000 * (floor - float(arms[-1][0].base[2, 3]))
+    return workspace_figures.labelled(arms, floor_mm)
 
 
 def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: Sequence[tuple[str, str]]) -> Answer:
@@ -92,7 +95,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: which one, how large."""
-    note = with_unit(workspace_figures.litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper), "L")
+    note = with_unit(workspace_figures.litres(void), "L")
     if void.holds_shoulder:
         note = tr("{size}: normal", size=note)
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
@@ -112,11 +115,10 @@ def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
 
 
 def _void_row(row: int, void: model.VoidSummary) -> list[str]:
-    low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
     return [
         str(row),
         workspace_figures.void_name(row, void),
-        workspace_figures.litres(low, high),
+        workspace_figures.litres(void),
         *map(millimetres, (void.centroid_m, void.low_m, void.high_m)),
         say(void.cause),
     ]

@@ -37,7 +37,6 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 MOTIONS = {name: stage.motions for name, stage in STAGES.items() if stage.motions}
-NAMED = 3  # motions that a short line names
 
 
 def _box(name: str, low: Reals, high: Reals) -> Box:
@@ -67,8 +66,7 @@ class Tray:
     @property
     def high(self) -> Reals:
         """Its upper corner (3,), m."""
-        found: Reals = np.array(self.place.centre_m) + np.array(self.place.size_m) / 2
-        return found
+        return self.low + self.place.size_m
 
     @property
     def floor(self) -> float | None:
@@ -253,24 +251,22 @@ class Placing:
         found = {stage: [name for name in self.sound.get(stage, ()) if name in met] for stage, met in tried.met.items()}
         return {stage: names for stage, names in found.items() if names}
 
-    def hindrance(self, tried: Tried, most: int = NAMED) -> str:
-        """Of how many of the motions that pass it is in the way at a place; of at most so many by name."""
-        names = [name for each in self.hindered(tried).values() for name in each]
-        if not tried.met:
+    @property
+    def hindrance(self) -> str:
+        """Of how many of the motions that pass it is in the way."""
+        some = sum(map(len, self.hindered(self.tried[0]).values()))
+        if not self.met:
             return tr("no path, program or grasp was compared with it")
         if not self.passing:
             return tr("no motion passes that it could be in the way of")
-        if not names:
+        if not some:
             return tr(
                 "in the way of none of the {count} motions that pass without it ({parts}); nothing was planned around "
                 "it",
                 count=self.passing,
                 parts=self._parts,
             )
-        said = tr(
-            "in the way of {some} of the {count} motions that pass without it", some=len(names), count=self.passing
-        )
-        return said if len(names) > most else tr("{said}: {names}", said=said, names=joined(names, ", "))
+        return tr("in the way of {some} of the {count} motions that pass without it", some=some, count=self.passing)
 
     @property
     def _parts(self) -> str:
@@ -373,6 +369,19 @@ def _is_sound(grasped: ObjectResult, results: VisionResults) -> bool:
     return grasped.expect in (None, "grasped") and (shapes is None or grasped.name not in shapes.near)
 
 
+def found_by(stored: Stored[Any], stage: str, robot: str = "") -> Stored[Any] | None:
+    """What another stage found, of the same robot or of one that is elsewhere; None where it found nothing.
+
+    Parameters
+    ----------
+    stored : what a stage found, as it was read from a folder
+    robot : way from the folder of the stage's robot to that of the other one
+    """
+    folder = stored.folder.parent / robot / stage if stored.folder else None
+    found = read_stage(folder, STAGES[stage]) if folder and is_computed(folder) else None
+    return None if found and isinstance(found.results, AbsentResults) else found
+
+
 def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
     """Where to put the tray, from the results that lie beside those of a stage.
 
@@ -380,10 +389,8 @@ def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
     """
     if stored.rests_on.get("validation") == "fail":
         return None
-    beside = stored.folder.parent if stored.folder else None
-    names = [name for name in ("workspace", "inverse", *MOTIONS) if beside and is_computed(beside / name)]
-    found = {name: read_stage(beside / name, STAGES[name]) for name in names} if beside else {}
-    found = {name: each for name, each in found.items() if not isinstance(each.results, AbsentResults)}
+    names = ("workspace", "inverse", *MOTIONS)
+    found = {name: each for name in names if (each := found_by(stored, name))}
     found[stored.stage] = stored
     if "workspace" not in found:
         return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from markupsafe import Markup
@@ -12,32 +11,34 @@ from er3a.collision.scene import Scene
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.language import N_, tr
+from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed
 from er3a.pipeline.messages.workspace import reaches
 from er3a.pipeline.player.turning import Layer, Solids, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
-from er3a.pipeline.viewing.drawn import drawn_scene
+from er3a.pipeline.viewing.drawn import drawn_scene, floor_of
 from er3a.pipeline.viewing.palette import VERDICTS, VOIDS
-from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, dimension, side_view
+from er3a.pipeline.viewing.side_view import UPRIGHT, DrawnLine, Kind, Label, SeenArm, border_lines, dimension, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
 from er3a.workspace.voids import mesh as surface_of
 
 REACHED = "#9ecae1"
-ASIDE = (0.12, 0.2)  # of the reach, from a void before axis 1 to its name
+ASIDE = (0.12, 0.28)  # of the reach, from a void before axis 1 to its name
 BELOW = 0.08  # of the reach, from what is reached down to its dimension
 
 
-def slide_names(frame: model.SectionFrame) -> tuple[str, str]:
+def slide_names(frame: model.SectionFrame) -> list[str]:
     """Labels of the axes across the slide."""
-    x, _, z = (", ".join(fixed(part, 2).removesuffix(".00") for part in axis) for axis in frame.axes)
-    return (
-        tr("across the slide, along ({axis}) of the base (mm)", axis=x),
-        tr("across the slide, along ({axis}) of the base (mm)", axis=z),
-    )
+    return [
+        tr(
+            "across the slide, along ({axis}) of the base (mm)",
+            axis=", ".join(fixed(part, 2).removesuffix(".00") for part in axis),
+        )
+        for axis in frame.axes[::2]
+    ]
 
 
 def _filled(proof: model.ProofCells, rho: Reals, azimuth: Reals, z: float) -> Flags:
@@ -87,7 +88,7 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None,
         colour = VERDICTS["pass" if i == 1 else "caution"]
         drawn, *stand = drawn_scene(tray.parts, robot)
         solids.append(Solids(tray.name, [drawn | {"colour": colour}, *stand], np.eye(4)[None], colour, f"tray-{i}"))
-    return turning_figure(layers, solids, cut_m=results.summary.axis.point_m[1])
+    return turning_figure(layers, solids, results.summary.axis.point_m[1], floor_of(scene) or 0.0)
 
 
 def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals, Integers]:
@@ -114,40 +115,39 @@ def _smoothed(points: Reals, faces: Integers) -> Reals:
     return points
 
 
-def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | None, kind: Kind) -> Markup:
-    """The arm in what it reaches, seen across axis 1, with names: reach, floor, and the voids all around
-    axis 1. An open one and a tray are elsewhere: the view from above shows them.
+def labelled(arms: Sequence[tuple[Robot, model.WorkspaceResults, Kind]], floor_mm: float | None) -> Markup:
+    """Arms in what they reach, seen across axis 1, with names: reach, floor, and the voids all around axis 1. An open
+    one and a tray are elsewhere: the view from above shows them.
 
     Parameters
     ----------
+    arms : in red one whose table is wrong, without its voids
     floor_mm : height of the floor in the base's frame; None where there is none
-    kind : of the arm: in red where its table is wrong
 
     Returns
     -------
     drawing : as HTML
     """
-    summary, border = results.summary, results.border
-    points = skeleton(robot, np.zeros(robot.joints)) - summary.axis.point_m
-    arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
-    lines = border_lines(border.arc, border.rho_m, border.z_m)
-    outer = np.concatenate(lines)
-    low, high = outer.min(axis=0), outer.max(axis=0)
-    labels = []
-    for number_, void in enumerate(summary.voids, 1):
-        label = void_label(number_, void)
-        if void.kind == "enclosed":
-            labels.append(replace(label, at=label.at + high * ASIDE, start=label.at))
-    seen = SeenArm(tr("From the side"), "", kind, arm, lines)
-    far, height = outer[outer[:, 0].argmax()]
-    below = low[1] - BELOW * far
-    labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far / 2]), kind))
-    over = dimension(far, below, height, kind)
-    return side_view([seen], floor_mm, ratio=1.2, labels=labels, over=over)
+    seen, labels, over = list[SeenArm](), list[Label](), list[DrawnLine]()
+    for robot, results, kind in arms:
+        summary, border = results.summary, results.border
+        points = skeleton(robot, np.zeros(robot.joints)) - summary.axis.point_m
+        arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
+        lines = border_lines(border.arc, border.rho_m, border.z_m)
+        seen.append(SeenArm(own_title(robot.title), "", kind, arm, lines))
+        outer = np.concatenate(lines)
+        if kind == "right":
+            labels += void_labels(summary)
+        far, height = outer[outer[:, 0].argmax()]
+        below = outer[:, 1].min() - BELOW * far
+        labels.append(Label(reaches(summary), np.array([-far / 5, below - BELOW * far]), kind))
+        over += dimension(far, below, height, kind)
+    return side_view(seen, floor_mm, ratio=UPRIGHT if arms[1:] else 1.2, labels=labels, over=over)
 
 
-def litres(low: float, high: float) -> str:
-    """Bounds of a volume in litres, rounded outwards."""
+def litres(void: model.VoidSummary) -> str:
+    """Bounds of a void's volume in litres, rounded outwards."""
+    low, high = (1000 * bound for bound in (void.volume_m3.lower, void.volume_m3.upper))
     return tr("{low} to {high}", low=at_least(low, "L"), high=at_most(high, "L"))
 
 
@@ -160,9 +160,14 @@ def void_name(number_: int, void: model.VoidSummary) -> str:
     return tr(VOID_NAMES[void.kind], number=number_)
 
 
-def void_label(number_: int, void: model.VoidSummary) -> Label:
-    """The name of a void, at its place."""
-    name = tr("void, {size} L", size=litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper))
-    low, high = void.low_m[0], void.high_m[0]
-    across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
-    return Label(name, 1000 * np.array([across, void.centroid_m[2]]), "hole", f"hole-{number_}")
+def void_labels(summary: model.WorkspaceSummary) -> list[Label]:
+    """A word for each void all around axis 1, led to it from its side; a list says how large it is."""
+    labels = []
+    for number_, void in enumerate(summary.voids, 1):
+        low, high = void.low_m[0], void.high_m[0]
+        across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
+        start = 1000 * np.array([across, void.centroid_m[2]])
+        at = start + 1000 * summary.reach_m.furthest_from_axis * np.array(ASIDE)
+        if void.kind == "enclosed":
+            labels.append(Label(tr("void"), at, "hole", f"hole-{number_}", start, written_there=True))
+    return labels
