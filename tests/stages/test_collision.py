@@ -21,6 +21,7 @@ from er3a.pipeline.results import read_results, read_scope
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute
 from er3a.pipeline.stages.collision.model import RESULTS
+from er3a.pipeline.stages.collision.page.played import events
 from er3a.pipeline.stages.inverse.compute import solve_target
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
@@ -122,6 +123,15 @@ def test_targets_are_judged_in_the_solutions_that_the_inverse_stage_chooses(resu
     }
     judged = {each.name: each.q_deg for each in results.summary.closest if each.kind == "target"}
     assert judged == {name: pytest.approx(q, abs=1e-9) for name, q in chosen.items() if q is not None}
+
+
+@pytest.mark.long
+def test_a_path_is_red_from_its_first_contact(results):
+    rows = results.paths.take(results.paths.path == "line_collides")
+    first = next(each for each in events(results, "line_collides", rows) if each.status == "fail")
+    at = load_robot(NAME), np.radians(rows.q_deg[rows.t_s == first.t]), load_scene(SCENE)
+    np.testing.assert_allclose(clearance(*at).distance, [0.0], atol=1e-6)
+    assert (rows.clearance_mm[rows.t_s < first.t] > 0).all()
 
 
 @pytest.mark.long

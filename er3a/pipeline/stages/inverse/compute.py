@@ -144,9 +144,9 @@ def regular_first(robot: Robot, solutions: Solutions, q_ref: Reals, refused: Seq
     """
     choice = nearest(robot, solutions, q_ref, refused)
     late = np.asarray(_singular(robot, solutions)[choice.order].any(axis=1))
-    passed_over = late[:1].any() and not late.all()
-    reason = fact("nearest_regular") if passed_over else choice.reason
-    return replace(choice, order=choice.order[np.argsort(late, kind="stable")], reason=reason)
+    moved = np.argsort(late, kind="stable")  # its first is not 0 where a singular one was first
+    reason = fact("nearest_regular") if moved[:1].any() else choice.reason
+    return replace(choice, order=choice.order[moved], reason=reason)
 
 
 def collides(rows: model.SolutionRows) -> Flags:
