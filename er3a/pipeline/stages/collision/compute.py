@@ -81,7 +81,7 @@ def target_clearances(
                 fact("colliding_target", name=target.name, pair=choice.reason.overlap.pair, expected=expected)
             )
         if chosen is not None:
-            at = int(np.flatnonzero(rows == chosen)[0])
+            at = np.searchsorted(rows, chosen)
             if pair[at] >= 0:
                 closest.append(
                     _closest(bodies, (target.name, "target", None), solutions.q[chosen], distance[at], pair[at])

@@ -36,8 +36,8 @@ def poses(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
 
 
 def _pose(robot: Robot, found: Closest) -> PlayedMotion:
-    (a, b, c), (d, e, f) = (np.array([found.from_mm, found.to_mm]) / 1000).tolist()
-    mark = Mark(0.0, 1.0, (a, b, c), (d, e, f), _clearance(found.clearance_mm))
+    start, end = (np.array([found.from_mm, found.to_mm]) / 1000).tolist()
+    mark = Mark(0.0, 1.0, start, end, _clearance(found.clearance_mm))
     return at_rest(robot, found.name, _least(found).text, q=meant(robot, np.array(found.q_deg)), marks=[mark])
 
 
