@@ -119,6 +119,7 @@ class _Motion:
     def __init__(self, bodies: Bodies, joints: Joints, rates: RateBounds) -> None:
         self.bodies, self.joints, self.rates = bodies, joints, rates
         self.known: dict[float, Reals] = {}
+        self.every = np.arange(len(bodies.pairs))
         own = np.flatnonzero(bodies.second >= 0)
         solid = np.flatnonzero(bodies.second < 0)
         moving, track = np.unique(bodies.first[solid], return_inverse=True)
@@ -207,6 +208,10 @@ class _Motion:
             found[missing] = self.bodies.distances(q, missing)
         return found
 
+    def measure_at(self, t: float) -> None:
+        """Measure all distances at a time, s, which need not be one of the points."""
+        self.measure(t, self.joints(np.array([t]))[0], self.every)
+
 
 def clearance_along(
     bodies: Bodies, joints: Joints, rates: RateBounds, t: Reals, shown: Reals, depth: float
@@ -229,7 +234,7 @@ def clearance_along(
         distance has no jump where they begin to
     """
     motion = _Motion(bodies, joints, rates)
-    every = np.arange(len(bodies.pairs))
+    every = motion.every
     if not every.size:
         none = len(shown)
         return ClearanceAlong(shown, np.full(none, np.nan), (None,) * none, np.full(none, -1), (), 0)
@@ -293,11 +298,10 @@ def _steps(motion: _Motion, times: Reals, q: Reals) -> Reals:
 
 def _refine(motion: _Motion, times: Reals, q: Reals, travel: Reals, step: float) -> None:
     """Measure between known points until each pair is free in all of an interval, or overlaps in it, or it is short."""
-    every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
     bodies = motion.bodies
     best = min(float(bodies.counted(motion.known[times[i]]).min()) for i in known)
-    waiting = [(a, b, every) for a, b in pairwise(known)]
+    waiting = [(a, b, motion.every) for a, b in pairwise(known)]
     while waiting:
         a, b, pairs = waiting.pop()
         before, after = motion.known[times[a]], motion.known[times[b]]
@@ -316,17 +320,16 @@ def _refine(motion: _Motion, times: Reals, q: Reals, travel: Reals, step: float)
         nearest = float(np.nanmin(bodies.counted(found)))
         if nearest < best:
             best = nearest
-            motion.measure(times[middle], q[middle], every)
+            motion.measure(times[middle], q[middle], motion.every)
         waiting += [(a, middle, pairs), (middle, b, pairs)]
 
 
 def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Contact]:
-    """Stretches of overlap between known points, their ends located where the smallest distance is 0."""
-    every = np.arange(len(motion.bodies.pairs))
+    """Stretches of overlap between known points, their ends located where the smallest distance is 0, and measured."""
     known = [i for i, time in enumerate(times) if time in motion.known]
     overlap = np.array([bool(np.nanmin(motion.known[times[i]]) <= 0) for i in known])
 
-    def apart(at: float, pairs: Integers = every) -> float:
+    def apart(at: float, pairs: Integers = motion.every) -> float:
         return float(motion.bodies.distances(motion.joints(np.array([at]))[0], pairs).min())
 
     found = []
@@ -334,9 +337,11 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
         first, last = times[known[a]], times[known[b - 1]]
         start = scipy.optimize.brentq(apart, times[known[a - 1]], first, xtol=near) if a > 0 else first
         end = scipy.optimize.brentq(apart, last, times[known[b]], xtol=near) if b < len(known) else last
+        for edge in (start, end):
+            motion.measure_at(edge)
         inside = known[max(a - 1, 0) : b + 1]
         at = times[inside]
-        rows = np.array([motion.bodies.distances(q[i], every) for i in inside])
+        rows = np.array([motion.bodies.distances(q[i], motion.every) for i in inside])
         touches: dict[Pair, Touch] = {}
         for k in np.flatnonzero(rows[(at >= first) & (at <= last)].min(axis=0) <= 0).tolist():
             touch = _touch(motion, k, at, rows[:, k], partial(apart, pairs=np.array([k])), near)
@@ -361,11 +366,11 @@ def _touch(
     found = scipy.optimize.minimize_scalar(
         apart, bounds=beside, method="bounded", options={"xatol": DEEPEST / LOCATED * near}
     )
-    if found.fun < distances[deepest] - LEVEL:
-        at = float(found.x)
-        motion.measure(at, motion.joints(np.array([at]))[0], np.arange(len(motion.bodies.pairs)))
-        return Touch(motion.bodies.pairs[k], start, -float(found.fun), at)
-    return Touch(motion.bodies.pairs[k], start, -float(distances[deepest]), at)
+    depth = -float(distances[deepest])
+    if -found.fun > depth + LEVEL:
+        at, depth = float(found.x), -float(found.fun)
+        motion.measure_at(at)
+    return Touch(motion.bodies.pairs[k], start, depth, at)
 
 
 STEP = 0.02

@@ -288,6 +288,8 @@ def test_a_typed_pose_is_reached_or_refused_in_words(used):
     used.one("#pose-form input").send_keys(SELECT_ALL, Keys.DELETE)
     used.one("#pose-form button[type=submit]").click()
     assert "needs a number" in used.text("#pose-message")
+    click_jog(used, 0)
+    assert used.text("#pose-message") == ""  # the arm has moved since
 
 
 @pytest.mark.parametrize("frame", ["base", "tool", "joints"])

@@ -56,6 +56,7 @@ def test_thin_obstacle_between_two_points_is_found(robot, obstacle):
     (contact,) = found.contacts
     assert fact("link_and_solid", link=6, solid=solid["name"]) in contact.pairs
     assert 0 < contact.start < 0.5 < contact.end < 1
+    assert np.isin([contact.start, contact.end], found.t).all()
     edges = clearance(robot, move.joints(np.array([contact.start, contact.end]))[0], scene)
     np.testing.assert_allclose(edges.distance, 0, atol=1e-6)
     assert found.measured < 150

@@ -14,12 +14,15 @@ from er3a.collision.along import clearance
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
+from er3a.files.target_file import load_targets
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results, read_scope
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute
 from er3a.pipeline.stages.collision.model import RESULTS
+from er3a.pipeline.stages.collision.page.played import events
+from er3a.pipeline.stages.inverse.compute import solve_target
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach.panel import write_teach_page
@@ -109,6 +112,26 @@ def test_the_verdict_names_the_nearest_target_and_the_paths_that_collide(results
     assert met
     assert len(found.demonstrations) == len(met)  # counted apart, as the stages of paths and targets count them
     assert f" {', '.join(met)}. " in say(found)
+
+
+@pytest.mark.long
+def test_targets_are_judged_in_the_solutions_that_the_inverse_stage_chooses(results):
+    robot, scene = load_robot(NAME), load_scene(SCENE)
+    chosen = {
+        each.name: solve_target(robot, each, scene, advise=False).result.chosen_deg
+        for each in load_targets(study_with().entry(NAME).targets, robot)
+    }
+    judged = {each.name: each.q_deg for each in results.summary.closest if each.kind == "target"}
+    assert judged == {name: pytest.approx(q, abs=1e-9) for name, q in chosen.items() if q is not None}
+
+
+@pytest.mark.long
+def test_a_path_is_red_from_its_first_contact(results):
+    rows = results.paths.take(results.paths.path == "line_collides")
+    first = next(each for each in events(results, "line_collides", rows) if each.status == "fail")
+    at = load_robot(NAME), np.radians(rows.q_deg[rows.t_s == first.t]), load_scene(SCENE)
+    np.testing.assert_allclose(clearance(*at).distance, [0.0], atol=1e-6)
+    assert (rows.clearance_mm[rows.t_s < first.t] > 0).all()
 
 
 @pytest.mark.long

@@ -167,6 +167,7 @@ function sticks(poses, css, shown) {
   const off = joints.filter((joint, k) => Math.hypot(...subtract(joint, column(shown[k], 3))) > CLOSED * data.size);
   if (off.length) space.line(joints, css, 4);
   off.forEach((joint) => space.dot(joint, css, 4.5));
+  space.keepClear(off, DOT * data.size);
   const away = (joint) => Math.min(...shown.map((T) => Math.hypot(...subtract(joint, column(T, 3)))));
   return off.length ? off.reduce((a, b) => (away(b) > away(a) ? b : a)) : [];
 }
@@ -260,6 +261,7 @@ function show(element, text) {
 function newMotion() {
   dispatchEvent(new CustomEvent("motion", { detail: motion.name }));
   bar.dataset.motion = chooser.value = motion.name;
+  part("ticks").classList.toggle("solutions", motion.ghosts.length > 0);
   part("controls").classList.toggle("rests", new Set(motion.values.flat().map(String)).size === arms.length);
   Object.assign(bar, { min: String(start()), max: String(whole()), step: "any" });
   const beyond = { t: end(), until: whole(), status: "none", text: motion.events.at(-1)?.text || motion.name };

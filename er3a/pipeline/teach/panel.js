@@ -67,7 +67,7 @@ function goTo(angles) {
 function follow() {
   refresh();
   for (const k of JOINTS) showJoint(k);
-  write(byId("message"), "");
+  document.querySelectorAll(".message").forEach((each) => write(each, "")); // what was said before the arm moved
   clearTimeout(linkTimer);
   linkTimer = setTimeout(() => history.replaceState(null, "", fragment()), LINK_PAUSE);
 }

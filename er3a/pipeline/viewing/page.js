@@ -765,10 +765,10 @@ addEventListener("click", keepPlace, true);
 addEventListener("player", returnToPlace);
 returnToPlace();
 
-// What an entry of a table is of is marked in the picture: of the address, of what is to be done next, or under the pointer.
+// What an entry of a table is of is marked in the picture: of the address, or under the pointer.
 const entryOf = (hash) => hash?.slice(1).replace(/^(cell|entry)-/, "") || null;
 const entryLinks = document.querySelectorAll(".runs a[href^='#cell-'], .grid .entries a");
-function showEntry(entry = entryOf(location.hash || document.querySelector(".fix a[href^='#cell-']")?.hash)) {
+function showEntry(entry = entryOf(location.hash)) {
   for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
   for (const link of entryLinks) link.toggleAttribute("data-shown", entryOf(link.hash) === entry);
 }

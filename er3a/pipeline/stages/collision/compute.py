@@ -23,12 +23,12 @@ from er3a.pipeline.scope import OF_MOTIONS, Coverage, Open, by_reason, coverages
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.covered import Covered, assumed_tool, covered_collisions, gaps_in_solids
+from er3a.pipeline.stages.inverse.compute import regular_first
 from er3a.pipeline.stages.trajectory.judgement import measured
 from er3a.pipeline.stages.trajectory.motion import ListedMotion, listed_motions, task_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
-from er3a.selection.nearest import nearest
 from er3a.selection.select import refusals_of
 
 
@@ -73,7 +73,7 @@ def target_clearances(
                 between=[label_of(bodies.pairs[k]) if k >= 0 else "" for k in pair],
             )
         )
-        choice = nearest(robot, solutions, target.q_ref, refusals_of(bodies, solutions))
+        choice = regular_first(robot, solutions, target.q_ref, refusals_of(bodies, solutions))
         chosen = choice.chosen
         if is_one(choice.reason, "all_collide"):
             expected = target.expect == "collides"
@@ -81,7 +81,7 @@ def target_clearances(
                 fact("colliding_target", name=target.name, pair=choice.reason.overlap.pair, expected=expected)
             )
         if chosen is not None:
-            at = int(np.flatnonzero(rows == chosen)[0])
+            at = np.searchsorted(rows, chosen)
             if pair[at] >= 0:
                 closest.append(
                     _closest(bodies, (target.name, "target", None), solutions.q[chosen], distance[at], pair[at])

@@ -80,7 +80,7 @@ def solve_target(
     if many:
         solutions = solutions.without_turns()
     refused = refusals(robot, solutions, scene)
-    choice = _regular_first(nearest(robot, solutions, target.q_ref, refused), _singular(robot, solutions))
+    choice = regular_first(robot, solutions, target.q_ref, refused)
     rows = _rows(robot, target, solutions, choice, refused)
     found, within = np.unique(rows.branch), np.unique(rows.branch[rows.within_limits])
     chosen = choice.chosen
@@ -128,12 +128,25 @@ def solve_target(
     return SolvedTarget(result, rows, solutions)
 
 
-def _regular_first(choice: Choice, singular: Flags) -> Choice:
-    """The same solutions, singular ones (N, 4) last: from these the tool can't move straight in every direction."""
-    late = np.asarray(singular[choice.order].any(axis=1))
-    passed_over = late[:1].any() and not late.all()
-    reason = fact("nearest_regular") if passed_over else choice.reason
-    return replace(choice, order=choice.order[np.argsort(late, kind="stable")], reason=reason)
+def regular_first(robot: Robot, solutions: Solutions, q_ref: Reals, refused: Sequence[Finding | None]) -> Choice:
+    """The choice of every stage: nearest first, singular ones last: from these the tool can't move straight in every
+    direction.
+
+    Parameters
+    ----------
+    solutions : all solutions of the pose, (N, n)
+    q_ref : (n,), rad or m, where the arm comes from
+    refused : why each row is not admissible
+
+    Returns
+    -------
+    choice : its reason says whether nearer singular ones were passed over
+    """
+    choice = nearest(robot, solutions, q_ref, refused)
+    late = np.asarray(_singular(robot, solutions)[choice.order].any(axis=1))
+    moved = np.argsort(late, kind="stable")  # its first is not 0 where a singular one was first
+    reason = fact("nearest_regular") if moved[:1].any() else choice.reason
+    return replace(choice, order=choice.order[moved], reason=reason)
 
 
 def collides(rows: model.SolutionRows) -> Flags:

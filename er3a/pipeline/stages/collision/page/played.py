@@ -14,6 +14,7 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 MOMENT = 1e-6  # s
+TOUCHING = 1e-3  # mm: far above what is left where bodies first touch
 
 
 def motions(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
@@ -21,7 +22,7 @@ def motions(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
     motions = []
     for name in dict.fromkeys(results.paths.path.tolist()):
         own = results.paths.take(results.paths.path == name)
-        rows = own.take(np.flatnonzero(np.isfinite(own.q_deg).all(axis=1)))
+        rows = own.take(np.isfinite(own.q_deg.sum(axis=1)))
         q = meant(robot, rows.q_deg)
         motions.append(
             PlayedMotion(name, "", rows.t_s, q, events(results, name, rows), nearest(rows), whole_s=own.t_s[-1])
@@ -35,8 +36,8 @@ def poses(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
 
 
 def _pose(robot: Robot, found: Closest) -> PlayedMotion:
-    (a, b, c), (d, e, f) = (np.array([found.from_mm, found.to_mm]) / 1000).tolist()
-    mark = Mark(0.0, 1.0, (a, b, c), (d, e, f), _clearance(found.clearance_mm))
+    start, end = (np.array([found.from_mm, found.to_mm]) / 1000).tolist()
+    mark = Mark(0.0, 1.0, start, end, _clearance(found.clearance_mm))
     return at_rest(robot, found.name, _least(found).text, q=meant(robot, np.array(found.q_deg)), marks=[mark])
 
 
@@ -48,11 +49,12 @@ def events(results: CollisionResults, path: str, rows: PathClearances) -> list[P
 
 def _overlaps(rows: PathClearances) -> list[PlayedEvent]:
     """Where the nearest bodies overlap, each stretch with one pair."""
-    label = np.where(rows.clearance_mm < 0, rows.between, "")
+    far = rows.clearance_mm
+    label = np.where(far < TOUCHING, rows.between, "")
     starts = np.union1d(np.flatnonzero(label != np.roll(label, 1)), [0])
     ends = np.append(starts[1:], len(rows) - 1)
     return [
-        PlayedEvent(rows.t_s[i], rows.t_s[j], _inside(bodies, rows.clearance_mm[i : j + 1].min()), "fail", bodies)
+        PlayedEvent(rows.t_s[i], rows.t_s[j - (label[j] == "")], _inside(bodies, far[i : j + 1].min()), "fail", bodies)
         for i, j in zip(starts, ends)
         if len(bodies := tuple(label[i].split("/"))) == 2
     ]

@@ -19,7 +19,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, motions, within
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, bars, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import JOINTS
@@ -219,7 +219,8 @@ def _row(
     if limit:
         value = tr("{value} of {limit}", value=value, limit=number(limit, 2))
     mark = _mark(motor) if limit else "none"
-    return ListRow(mark, name, with_unit(value, motor.unit), f"#{moment[0]}", moment, min(1.0, share))
+    parts = [] if limit else [Part(0.0, 1.0, "none", JOINTS[motor.joint - 1])]
+    return ListRow(mark, name, with_unit(value, motor.unit), f"#{moment[0]}", moment, min(1.0, share), parts)
 
 
 def _links(summary: model.DynamicsSummary) -> list[list[str]]:

@@ -70,8 +70,8 @@ def with_singularity(said: str, rows: SolutionRows, k: int) -> str:
 
 def _line(start_mm: Position, end_mm: Position, name: str, count: int) -> Mark:
     """A line between two places, a dot where they are one, as long as ``count`` solutions are shown."""
-    (a, b, c), (x, y, z) = start_mm, end_mm
-    return Mark(0.0, float(count), (a / 1000, b / 1000, c / 1000), (x / 1000, y / 1000, z / 1000), name)
+    start, end = (np.array([start_mm, end_mm]) / 1000).tolist()
+    return Mark(0.0, float(count), start, end, name)
 
 
 def refusal_in_short(refusal: Finding | None) -> str:

@@ -120,7 +120,7 @@ def _errors(name: str, mm: model.ErrorParts, deg: model.ErrorParts, limit: float
         rows.append(ListRow("none", tr(cause), text, "", moment, off / longest, whole))
     good: Literal["pass", "fail"] = "pass" if mm.together <= limit else "fail"
     rows[1] = replace(rows[1], mark=good, parts=[Part(0.0, 1.0, good)])
-    return Group(tr("Error at {name}, 95 %", name=name), rows, counted=False)
+    return Group(tr("Greatest error, 95 %: {name}", name=name), rows, counted=False)
 
 
 AXES = ("x", "y", "z")
@@ -196,7 +196,7 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
         mm, deg, each = worst
         groups.append(_errors(each.name, mm, deg, limit, grasp_moment(results, each)))
     if found and (found.suspects or found.warnings):
-        rows = [ListRow("caution", each.sample, _why_left_out(each)) for each in found.suspects]
+        rows = [ListRow("caution", each.sample, _why_left_out(each), "#figure-residuals") for each in found.suspects]
         rows += [ListRow("caution", tr("camera"), say(each)) for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
     gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
