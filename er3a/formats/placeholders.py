@@ -70,13 +70,14 @@ def _no_efforts(robot: Robot) -> str:
 
 def _no_masses(robot: Robot) -> str:
     """Why masses are none; empty if they may be meant."""
-    masses = [each.body.mass for each in robot.masses.links]
+    links = [each for each in robot.masses.links if each.link]  # what the base weighs moves nothing
+    masses = [each.body.mass for each in links]
     if len(masses) >= SEVERAL and np.ptp(masses) == 0:
         return f"all links have the mass {masses[0]:g} kg"
-    moments = [np.linalg.eigvalsh(each.body.inertia_matrix) for each in robot.masses.links]
+    moments = [np.linalg.eigvalsh(each.body.inertia_matrix) for each in links]
     if len(moments) >= SEVERAL and np.allclose(moments, moments[0][0]):
         return f"all links have the moment of inertia {moments[0][0]:g} kg m2 about each axis"
-    away = {each.link: _outside(robot, each.link, np.array(each.body.centre)) for each in robot.masses.links}
+    away = {each.link: _outside(robot, each.link, np.array(each.body.centre)) for each in links}
     if far := {link: distance for link, distance in away.items() if distance > OUTSIDE_M}:
         link = max(far, key=lambda each: far[each])
         more = f" and {len(far) - 1} more" if len(far) > 1 else ""

@@ -302,11 +302,13 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
             problem = f"stands {apart:g} m from the one before it"
             remedy = "A URDF's lengths are in metres: divide millimetres by 1000"
             raise InputError(path, f"joint {joint.name}, xyz", problem, remedy)
-    return UrdfChain(tuple(joints), tree.by_name, (*_notes_of(joints), *notes))
+    return UrdfChain(tuple(joints), tree.by_name, (*_notes_of(tree, joints), *notes))
 
 
-def _notes_of(joints: Sequence[UrdfJoint]) -> Iterator[str]:
-    """The notes on joints, one for all joints of which the same is said."""
+def _notes_of(tree: Tree, joints: Sequence[UrdfJoint]) -> Iterator[str]:
+    """The notes on joints, one for all joints of which the same is said, and one on those beyond the last."""
+    if joints and (moving := tree.onward(link := joints[-1].child)[0]):
+        yield f"beyond the arm's last link {link} joints are kept at 0, as of a gripper: {_some(_names(moving))}"
     said = [(note, joint.name) for joint in joints for note in joint.notes]
     for note in dict(said):
         first, *others = [name for each, name in said if each == note]
@@ -390,7 +392,6 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
         moving, active = tree.onward(link)
         count = sum(joint.independent for joint in chain)
         if tree.hand_begins(moving, count):
-            notes.append(f"the gripper on link {link} ({_some(_names(moving))}) is kept where its joints are at 0")
             break
         if len(active) > 1:
             ends = [end for joint in active for end in tree.ends(joint.child, count + joint.independent)]
