@@ -112,10 +112,10 @@ def read_arm(
             if whole:
                 imported = import_urdf(plain, base=base, tip=tip)
                 home = None if srdf is None else srdf_home(srdf, imported.joints)
-                return ReadArm(imported.robot.replace(name=robot_name(path), home=home), False, imported.notes)
+                return ReadArm(imported.robot.replace(home=home), False, imported.notes)
             robot, assumed, beside = urdf_table(plain, base=base, tip=tip)
         units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
-        return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside, units)
+        return ReadArm(robot, False, assumed, beside, units)
     robot = known.robot if (known := known_arm(source)) else robot_of(read_robot(robot_path(source)))
     return ReadArm(robot, True, beside=beside_the_table(robot))
 

@@ -1,9 +1,9 @@
 """Values that fill a URDF's fields and are no data: they are named, and left out, so that nothing rests on them.
 
-A field that a format asks for is filled with something where its value is not known: the same effort for all joints,
-whatever they carry; 1 kg for each link; half a turn to either side for each joint. Other values can't be meant as they
-stand: centres of mass far outside of what the same file draws of the link, as in the base's coordinates; or moments of
-inertia about the links' origins.
+A field that a format asks for is filled with something where its value is not known: the same effort, friction or
+damping for all joints, whatever they carry; 1 kg for each link; half a turn to either side for each joint. Other values
+can't be meant as they stand: centres of mass far outside of what the same file draws of the link, as in the base's
+coordinates; or moments of inertia about the links' origins.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
 
     Returns
     -------
-    robot : without these efforts and masses; limits stay, graded ``inferred``
+    robot : without these efforts, frictions and masses; limits stay, graded ``inferred``
     notes : what was found, and what is not judged therefore; in words
     """
     notes = []
@@ -47,12 +47,16 @@ def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
         text = "The file gives all joints +-180 deg, which is a placeholder"
         robot = robot.replace(sources={**robot.sources, "limits": Source(text, "inferred")})
         notes.append("the limits +-180 deg of all joints are a placeholder: what rests on limits is not settled")
-    if why := _no_efforts(robot):
-        drives = robot.masses.drives
-        friction = drives and np.isfinite([drives.coulomb, drives.viscous]).any()
-        rest = replace(drives, peak=np.full(robot.joints, np.nan)) if drives and friction else None
-        robot = robot.replace(masses=replace(robot.masses, drives=rest))
+    drives, why = robot.masses.drives, _no_efforts(robot)
+    alike = [kind for kind in ("coulomb", "viscous") if drives and _alike(getattr(drives, kind))]
+    if drives and (why or alike):
+        rest = replace(drives, **dict.fromkeys([*alike, *(["peak"] if why else [])], np.full(robot.joints, np.nan)))
+        known = np.isfinite([rest.peak, rest.coulomb, rest.viscous]).any()
+        robot = robot.replace(masses=replace(robot.masses, drives=rest if known else None))
+    if why:
         notes.append(f"{why}: a placeholder, so no torque is held against it")
+    if alike:
+        notes.append("all joints have the same friction or damping: a placeholder, so joints count as without")
     if why := _no_masses(robot):
         robot = robot.replace(masses=Masses(drives=robot.masses.drives))
         notes.append(f"{why}: the masses can't be right, so no torque is judged")
@@ -61,22 +65,28 @@ def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
 
 def _no_efforts(robot: Robot) -> str:
     """Why efforts are none; empty if they may be meant."""
-    drives = robot.masses.drives
-    known = np.empty(0) if drives is None else drives.peak[np.isfinite(drives.peak)]
-    if len(known) >= SEVERAL and np.ptp(known) == 0:
-        return f"all joints have the effort {known[0]:g}"
-    return f"joints have the effort {THOUSAND:g}" if (known == THOUSAND).sum() >= SEVERAL else ""
+    peak = np.empty(0) if robot.masses.drives is None else robot.masses.drives.peak
+    if _alike(peak):
+        return f"all joints have the effort {np.nanmax(peak):g}"
+    return f"joints have the effort {THOUSAND:g}" if (peak == THOUSAND).sum() >= SEVERAL else ""
+
+
+def _alike(values: Reals) -> bool:
+    """Whether the joints of which a value is known have all the same, above 0."""
+    known = values[np.isfinite(values)]
+    return bool(len(known) >= SEVERAL and np.ptp(known) == 0 and known[0] > 0)
 
 
 def _no_masses(robot: Robot) -> str:
     """Why masses are none; empty if they may be meant."""
-    masses = [each.body.mass for each in robot.masses.links]
+    links = [each for each in robot.masses.links if each.link]  # what the base weighs moves nothing
+    masses = [each.body.mass for each in links]
     if len(masses) >= SEVERAL and np.ptp(masses) == 0:
         return f"all links have the mass {masses[0]:g} kg"
-    moments = [np.linalg.eigvalsh(each.body.inertia_matrix) for each in robot.masses.links]
+    moments = [np.linalg.eigvalsh(each.body.inertia_matrix) for each in links]
     if len(moments) >= SEVERAL and np.allclose(moments, moments[0][0]):
         return f"all links have the moment of inertia {moments[0][0]:g} kg m2 about each axis"
-    away = {each.link: _outside(robot, each.link, np.array(each.body.centre)) for each in robot.masses.links}
+    away = {each.link: _outside(robot, each.link, np.array(each.body.centre)) for each in links}
     if far := {link: distance for link, distance in away.items() if distance > OUTSIDE_M}:
         link = max(far, key=lambda each: far[each])
         more = f" and {len(far) - 1} more" if len(far) > 1 else ""

@@ -234,20 +234,23 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
     Returns
     -------
     place : of a link's name its frame (4, 4) in that of the chain's base and the number of moving joints before it;
-        None for a link that does not move with the chain. With ``carried`` what moves by itself on a link that moves,
-        such as fingers, counts as fixed where it is at 0
+        None for a link that does not move with the chain. What moves by itself on the last link, such as fingers,
+        counts as fixed where it is at 0; with ``carried`` all that hangs on a link that moves
     """
     above = {joint.child: joint for joint in found.all.values()}
     place = {found.joints[0].parent: (np.eye(4), 0)}
     for joint, _, T in _along(found.joints, shift[None]):
         place[joint.child] = T[0], place[joint.parent][1] + joint.moves
+    last, led = len(shift), {joint.name for joint in found.joints if joint.moves}
+    while more := {each.name for each in above.values() if each.mimic and each.mimic.source in led} - led:
+        led |= more
 
     def placed(name: str, carried: bool) -> tuple[Reals, int] | None:
-        behind, fixed = np.eye(4), True
-        while name not in place and name in above and (carried or not above[name].moves):
-            fixed &= not above[name].moves
+        behind, kept, led_on = np.eye(4), False, False
+        while name not in place and name in above:
+            kept, led_on = kept or above[name].moves, led_on or above[name].name in led
             behind, name = above[name].T_parent_joint @ behind, above[name].parent
-        if name not in place or not (fixed or place[name][1]):
+        if name not in place or (kept and not (place[name][1] if carried else place[name][1] == last and not led_on)):
             return None
         return place[name][0] @ behind, place[name][1]
 

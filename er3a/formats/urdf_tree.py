@@ -46,7 +46,7 @@ from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.si_units import limit_in_degrees
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, moved, nearest_body, no_body, together
-from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, Robot
+from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, Robot, robot_name
 
 MOVING = ("revolute", "continuous", "prismatic")
 LIMITS = {"limit": ("lower", "upper"), "safety_controller": ("soft_lower_limit", "soft_upper_limit")}
@@ -60,6 +60,7 @@ FINGER_JOINTS = 4
 GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
 SHOWN = 12
 CONTROLLER_BASE = "base"
+NAMED = re.compile(r'<robot\b[^>]*?\sname="([^"]+)"')
 PREFIXED = re.compile(r"(</?[\w.-]+):([\w.-]+)")
 WHOLE_TURN = 2 * math.pi + SNAP_RAD
 MAX_TURNED = 20 * math.pi
@@ -301,8 +302,17 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
             problem = f"stands {apart:g} m from the one before it"
             remedy = "A URDF's lengths are in metres: divide millimetres by 1000"
             raise InputError(path, f"joint {joint.name}, xyz", problem, remedy)
-    taken = [note for joint in joints for note in joint.notes]
-    return UrdfChain(tuple(joints), tree.by_name, (*taken, *notes))
+    return UrdfChain(tuple(joints), tree.by_name, (*_notes_of(tree, joints), *notes))
+
+
+def _notes_of(tree: Tree, joints: Sequence[UrdfJoint]) -> Iterator[str]:
+    """The notes on joints, one for all joints of which the same is said, and one on those beyond the last."""
+    if joints and (moving := tree.onward(link := joints[-1].child)[0]):
+        yield f"beyond the arm's last link {link} joints are kept at 0, as of a gripper: {_some(_names(moving))}"
+    said = [(note, joint.name) for joint in joints for note in joint.notes]
+    for note in dict(said):
+        first, *others = [name for each, name in said if each == note]
+        yield f"joint {first} {note}" + (f"; likewise {_some(others)}" if others else "")
 
 
 def tip_after(path: Path, base: str | None, joints: int) -> str | None:
@@ -382,7 +392,6 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
         moving, active = tree.onward(link)
         count = sum(joint.independent for joint in chain)
         if tree.hand_begins(moving, count):
-            notes.append(f"a gripper follows link {link} ({_some(_names(moving))}); it was left out")
             break
         if len(active) > 1:
             ends = [end for joint in active for end in tree.ends(joint.child, count + joint.independent)]
@@ -491,9 +500,9 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
         rpy = _unrounded(rpy, origin.get("rpy", "").split())
     doubtful = bool((np.abs(xyz) > FAR_APART_M).any() or (np.abs(rpy) > WHOLE_TURN).any())
     if (np.abs(xyz) > FAR_APART_M).any():
-        notes.append(f"{where} stands {np.abs(xyz).max():g} m from the one before it; a URDF's lengths are in metres")
+        notes.append(f"stands {np.abs(xyz).max():g} m from the one before it; a URDF's lengths are in metres")
     if (np.abs(rpy) > WHOLE_TURN).any():
-        notes.append(f"{where} is turned by {np.abs(rpy).max():g} rad; a URDF's angles are in radians")
+        notes.append(f"is turned by {np.abs(rpy).max():g} rad; a URDF's angles are in radians")
     direction = numbers_of(path, where, axis, "xyz", (1.0, 0.0, 0.0))
     longest = np.abs(direction).max()
     if kind in MOVING and longest < 1e-9:
@@ -503,7 +512,7 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     if kind == "continuous" and not math.isnan(lower):
         kind = "revolute" if max(-lower, upper) <= MAX_TURNED else kind
         taken = "they are kept" if kind == "revolute" else "not kept, as they are no range of up to ten turns"
-        notes.append(f"{where} is continuous with limits {lower:g} to {upper:g}: {taken}")
+        notes.append(f"is continuous with limits {lower:g} to {upper:g}: {taken}")
     if kind == "revolute":
         lower, upper = math.radians(limit_in_degrees(lower, 1)), math.radians(limit_in_degrees(upper, -1))
     stated = (limit.get("velocity") or "inf") if limit is not None else "inf"
@@ -532,7 +541,8 @@ def _range(path: Path, where: str, joint: ElementTree.Element, notes: list[str])
     given = {key: value for keys, row in zip(LIMITS.values(), stated) for key, value in zip(keys, row)}
     if not math.isnan(lower) and ((lower, upper) != tuple(stated[0]) or not both[0] < both[1]):
         shown = ", ".join(f"{key} {value:g}" for key, value in given.items() if not math.isnan(value))
-        notes.append(f"{where} states {shown}: {lower:g} to {upper:g} was taken")
+        soft = (taken[0] == stated[0]).all() and both[0] < both[1]
+        notes.append("is held to its soft limits" if soft else f"states {shown}: {lower:g} to {upper:g} was taken")
     return lower, upper
 
 
@@ -604,7 +614,7 @@ def in_links(
     Parameters
     ----------
     robot : the arm with the table derived from the same URDF
-    carried : whether what moves by itself on a link counts as fixed to it
+    carried : whether what moves by itself counts as fixed on each link that moves, and not on the last alone
 
     Yields
     ------
@@ -988,7 +998,7 @@ EXTRA = "Install it: pip install 'er3a[xacro]'; or expand the file elsewhere: xa
 
 @contextmanager
 def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
-    """The file itself if it is a URDF; of xacro the expanded URDF, for as long as the block lasts.
+    """The file itself if it is a URDF; of xacro the expanded URDF, named as its robot, for as long as the block lasts.
 
     Packages that the file names are searched for in the four folders above it and beside it, then where ROS has them.
 
@@ -1011,7 +1021,7 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
     values = dict(_argument(path, each) for each in arguments)
     expanded = _expanded(path, values)
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, f"{path.name.removesuffix('.xacro').removesuffix('.urdf')}.urdf")
+        file = Path(folder, f"{robot_name(Path(named[1] if (named := NAMED.search(expanded)) else path.stem))}.urdf")
         file.write_text(expanded, encoding="utf-8")
         try:
             yield file

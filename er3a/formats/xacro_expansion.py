@@ -1,9 +1,11 @@
 """``python -m er3a.formats.xacro_expansion FILE ARGUMENTS``: the URDF that a xacro file makes, on standard output.
 
-Its expressions are Python. xacrodoc keeps builtins from them and refuses names with two underscores, but neither in
-lambdas and comprehensions, nor from ``$(eval ...)``, nor from ``python.vars``; so the rest is refused here. Memory and
-files written are limited by the system, time by the process that calls this one. The last line on standard error says
-why nothing could be made.
+Its expressions are Python. xacro keeps builtins from them and refuses names with two underscores, but neither in
+lambdas and comprehensions, nor from ``$(eval ...)``, nor from ``python.vars``; so the rest is refused here, and
+``$(eval ...)`` is evaluated as ``${...}`` is. Memory and files written are limited by the system, time by the process
+that calls this one. The last line on standard error says why nothing could be made.
+
+Files from before 2014 write the tags in ``OLD`` without ``xacro:``.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from typing import Any
 MOST_TEXT = 20_000_000  # letters of a URDF
 MOST_MEMORY = 2_000_000_000  # bytes of addresses; the interpreter and xacrodoc take a tenth
 FOLDERS_UP = 4  # in and beside which packages are looked for
+OLD = ("property", "macro", "include", "insert_block", "if", "unless")
 INNER = re.compile(r"_|(gi|cr|ag|tb)_")  # attributes that lead from a value to the interpreter
 
 
@@ -56,9 +59,9 @@ def _limit() -> None:
 def _expanded(path: Path, values: dict[str, str]) -> str:
     import xacro
     from xacro import substitution_args
-    from xacrodoc import XacroDoc, packages
+    from xacrodoc import packages
 
-    evaluate = xacro.safe_eval
+    evaluate, load, parse = xacro.safe_eval, xacro.load_yaml, xacro.parse
 
     def checked(expression: str, *names: Any) -> Any:
         for node in ast.walk(ast.parse(expression.strip(), mode="eval")):
@@ -67,20 +70,28 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
                 raise ValueError(f"the name {name} is refused in expressions")
         return evaluate(expression, *names)
 
-    def refused(expression: str, context: object) -> str:
-        raise ValueError("$(eval) is refused: write ${...}")
+    def of_arguments(expression: str, context: dict[str, Any]) -> str:
+        given = {name: substitution_args.convert_value(str(value), "auto") for name, value in context["arg"].items()}
+        return str(checked(expression, {**xacro._global_symbols, **given, "arg": given.__getitem__}))
 
     def yaml_alone(file: str) -> object:
         if Path(xacro.abs_filename_spec(file)).resolve().suffix.lower() not in (".yaml", ".yml"):
             raise ValueError("load_yaml reads .yaml files alone")
         return load(file)
 
-    load, xacro.safe_eval, substitution_args._eval = xacro.load_yaml, checked, refused
+    def parsed(*source: Any) -> Any:
+        document = parse(*source)
+        for tag in OLD:
+            for element in document.getElementsByTagName(tag):
+                element.tagName = f"xacro:{tag}"
+        return document
+
+    xacro.safe_eval, substitution_args._eval, xacro.parse = checked, of_arguments, parsed
     del xacro._global_symbols["python"]["vars"]
     xacro._global_symbols["load_yaml"] = xacro._global_symbols["xacro"]["load_yaml"] = yaml_alone
     packages.reset()
     packages.update_package_cache(packages_near(path))
-    text: str = XacroDoc.from_file(path, subargs=values, resolve_packages=False).to_urdf_string()
+    text: str = xacro.process_file(str(path), mappings=values).toprettyxml()
     if len(text) > MOST_TEXT:
         raise ValueError(f"the URDF would have more than {MOST_TEXT:,} letters")
     return text

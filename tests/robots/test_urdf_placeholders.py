@@ -58,6 +58,28 @@ def test_efforts_that_are_none_are_unknown(tmp_path, effort):
     assert len(robot.masses.links) == 4
 
 
+def test_one_mass_for_all_links_that_move_is_seen_whatever_the_base_weighs(tmp_path):
+    path = written(tmp_path, mass="1")
+    base = '<link name="l0"><inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
+    path.write_text(path.read_text().replace('<link name="l0"/>', base))
+    assert not import_urdf(path).robot.masses.links
+
+
+@pytest.mark.parametrize(("damping", "kept"), [("1", False), ("{k}", True), ("0", True)])
+def test_one_friction_for_all_joints_is_none(tmp_path, damping, kept):
+    path = written(tmp_path)
+    text = path.read_text()
+    for k in range(1, 5):
+        dynamics = f'<dynamics damping="{damping.format(k=k)}" friction="{damping.format(k=k)}"/>'
+        text = text.replace(f'effort="{k}00"/>', f'effort="{k}00"/>{dynamics}')
+    path.write_text(text)
+    imported = import_urdf(path)
+    drives = imported.robot.masses.drives
+    assert np.isfinite(drives.peak).all()
+    assert np.isfinite([drives.coulomb, drives.viscous]).any() == kept
+    assert any("friction" in note for note in imported.notes) != kept
+
+
 def test_half_turns_everywhere_are_limits_that_someone_assumed(tmp_path):
     imported = import_urdf(written(tmp_path, limit=math.pi))
     assert imported.robot.sources["limits"].grade == "inferred"

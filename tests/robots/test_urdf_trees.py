@@ -98,8 +98,13 @@ def test_grippers_and_linkages_that_only_follow_are_left_out(written):
     assert any("only follow" in note and "p1" in note for note in imported.notes)
     assert any("gripper" in note and "f1, f2" in note for note in imported.notes)
     assert import_urdf(written(row(3), joint("gripper_joint", "revolute", "l2", "jaw"))).robot.joints == 4
-    alone = import_urdf(written(row(4), joint("gripper_joint", "revolute", "l3", "jaw")))
-    assert alone.robot.joints == 4
+    assert import_urdf(written(row(4), joint("gripper_joint", "revolute", "l3", "jaw"))).robot.joints == 4
+    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    jaw = joint("gripper_joint", "revolute", "l5", "jaw")
+    alone = import_urdf(written(row(6), jaw.replace('<link name="jaw"/>', f'<link name="jaw">{box}</link>')))
+    assert alone.robot.joints == 6
+    assert [each.link for each in alone.robot.hulls] == [6]
+    assert alone.robot.sources["envelopes"].grade == "export"
     assert any("gripper_joint" in note for note in alone.notes)
 
 

@@ -55,3 +55,22 @@ def test_expressions_and_macros_are_expanded(tmp_path):
         text = plain.read_text(encoding="utf-8")
     assert 'name="l1_4"' in text
     assert 'name="2"' in text
+
+
+def test_a_file_as_makers_write_it_is_expanded(tmp_path):
+    """Includes relative to the file, from a macro too; ``$(eval ...)`` over arguments; tags without a prefix."""
+    (tmp_path / "part.xacro").write_text('<robot><property name="R" value="3"/></robot>', encoding="utf-8")
+    file = tmp_path / "a.xacro"
+    parts = (
+        '<robot name="Maker 7" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="hand" default="false"/>',
+        '<xacro:macro name="m" params="file"><xacro:include filename="${file}"/><link name="l${R}"/></xacro:macro>',
+        '<xacro:m file="part.xacro"/>',
+        '<xacro:if value="$(eval hand and True)"><link name="hand"/></xacro:if></robot>',
+    )
+    file.write_text("".join(parts), encoding="utf-8")
+    for arguments, hand in (((), False), (("hand:=true",), True)):
+        with plain_urdf(file, arguments) as plain:
+            text = plain.read_text(encoding="utf-8")
+            assert plain.name == "maker_7.urdf"
+        assert 'name="l3"' in text
+        assert ('name="hand"' in text) == hand

@@ -257,14 +257,15 @@ def write_panel(
     Parameters
     ----------
     near : where the panel warns of a singularity
-    home : (n,), rad or m, that the panel opens at; None for that of the robot's file, or else the zero pose
+    home : (n,), rad or m, that the panel opens at; None for that of the robot's file, or else joints at 0, and those
+        whose limits leave 0 out in the middle of them
     robots, robot_pages : of the study: arms with a panel (name, title, address), and this arm's other pages
     first_caveat : what to know of its table, if anything
     head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
-    opened = next((q for q in (home, robot.home) if q is not None), np.zeros(robot.joints))
-    opened = np.clip(opened, robot.lower, robot.upper)
+    rest = np.where((robot.lower < 0) & (robot.upper > 0), 0.0, (robot.lower + robot.upper) / 2)
+    opened = np.clip(next((q for q in (home, robot.home) if q is not None), rest), robot.lower, robot.upper)
     panel = own | {
         "programs": own["programs"] and not (first_caveat and first_caveat.status == "fail"),
         "scene": drawn_scene(scene.solids if scene else (), robot),

@@ -23,12 +23,12 @@ from er3a.pipeline.scope import OF_MOTIONS, Coverage, Open, by_reason, coverages
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.covered import Covered, assumed_tool, covered_collisions, gaps_in_solids
-from er3a.pipeline.stages.inverse.compute import regular_first
 from er3a.pipeline.stages.trajectory.judgement import measured
 from er3a.pipeline.stages.trajectory.motion import ListedMotion, listed_motions, task_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
+from er3a.selection.regular_first import regular_first
 from er3a.selection.select import refusals_of
 
 

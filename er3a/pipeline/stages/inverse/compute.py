@@ -23,7 +23,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import Usable, neighbours
 from er3a.kinematics.round_trips import MAX_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.self_motions import SelfMotionCurve
-from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning
 from er3a.kinematics.solutions import MANY_TARGETS, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -45,11 +45,11 @@ from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, meant, shown, unit_compared
 from er3a.robots.robot import Robot
-from er3a.selection.nearest import Choice, nearest
+from er3a.selection.nearest import Choice
+from er3a.selection.regular_first import regular_first, singular
 from er3a.selection.rule_names import RuleName
 from er3a.selection.select import RULES, available_rules, mixed_cost, refusals
 
-SINGULAR = 1e-6  # sine of an angle, m from axis 1, or singular value (no unit): far above rounding
 LITTLE_MARGIN_DEG = 2.0  # mm of a prismatic joint; as much as grasps and boxes are asked for by default
 
 
@@ -128,27 +128,6 @@ def solve_target(
     return SolvedTarget(result, rows, solutions)
 
 
-def regular_first(robot: Robot, solutions: Solutions, q_ref: Reals, refused: Sequence[Finding | None]) -> Choice:
-    """The choice of every stage: nearest first, singular ones last: from these the tool can't move straight in every
-    direction.
-
-    Parameters
-    ----------
-    solutions : all solutions of the pose, (N, n)
-    q_ref : (n,), rad or m, where the arm comes from
-    refused : why each row is not admissible
-
-    Returns
-    -------
-    choice : its reason says whether nearer singular ones were passed over
-    """
-    choice = nearest(robot, solutions, q_ref, refused)
-    late = np.asarray(_singular(robot, solutions)[choice.order].any(axis=1))
-    moved = np.argsort(late, kind="stable")  # its first is not 0 where a singular one was first
-    reason = fact("nearest_regular") if moved[:1].any() else choice.reason
-    return replace(choice, order=choice.order[moved], reason=reason)
-
-
 def collides(rows: model.SolutionRows) -> Flags:
     """Which solutions are refused because something overlaps.
 
@@ -181,24 +160,11 @@ def _rows(
         orientation_residual=orientation,
         freed_turn=freed,
         manipulability=conditioning(robot, q, characteristic_length(robot)).manipulability,
-        singular=_singular(robot, solutions),
+        singular=singular(robot, solutions),
         limit_margin=limit_margin(robot, q),
         greatest_move=choice.max_joint_move,
         distance=choice.distance,
     )
-
-
-def _singular(robot: Robot, solutions: Solutions) -> Flags:
-    """Which of ``SINGULAR_PARTS`` each row is on, (n, 4); arms without closed form by the Jacobian's rank."""
-    found = np.zeros((len(solutions.q), len(model.SINGULAR_PARTS)), dtype=bool)
-    if has_branches(robot):
-        factors = determinant_factors(robot, solutions.q)
-        for column, kind in enumerate(TYPES):
-            found[:, column] = np.abs(getattr(factors, kind)) < SINGULAR
-    else:
-        smallest = conditioning(robot, solutions.q, characteristic_length(robot)).smallest_singular_value
-        found[:, model.SINGULAR_PARTS.index("rank")] = smallest < SINGULAR
-    return found
 
 
 def _first_of_branch(branch: Integers, rank: Integers) -> Flags:

@@ -15,9 +15,8 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.selection.nearest import WhyFirst
+from er3a.selection.regular_first import SINGULAR_PARTS
 from er3a.selection.rule_names import RuleName
-
-SINGULAR_PARTS = ("wrist", "elbow", "shoulder", "rank")
 
 
 @dataclass(frozen=True)

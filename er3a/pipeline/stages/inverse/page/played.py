@@ -14,9 +14,10 @@ from er3a.pipeline.messages.kinematics import branch_word, singularity_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
-from er3a.pipeline.stages.inverse.model import SINGULAR_PARTS, SolutionRows, TargetResult
+from er3a.pipeline.stages.inverse.model import SolutionRows, TargetResult
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
+from er3a.selection.regular_first import SINGULAR_PARTS
 
 SHOWN_S = 0.9  # how long the player shows a solution, before it moves to the next one for a tenth of a second
 Position = tuple[float, float, float]
