@@ -157,7 +157,7 @@ def test_verdicts_say_what_has_changed_since(small_study, monkeypatch):
 def test_the_first_table_can_be_read_while_the_rest_of_a_first_run_is_computed(small_study, tmp_path):
     run = replace(small_study, folder=shutil.copytree(small_study.folder, tmp_path / "project"))
     page = run.folder / "reports/er3a_c60/validation.html"
-    whole = page.read_bytes()
+    whole = _but_for_commit(page)
     for made in ("results/er3a_c60/validation/summary.json", "reports/index.html", "reports/er3a_c60/validation.html"):
         (run.folder / made).unlink()
     planned = run.snakemake("--dry-run", "--printshellcmds").stdout
@@ -166,7 +166,12 @@ def test_the_first_table_can_be_read_while_the_rest_of_a_first_run_is_computed(s
     command = [sys.executable, "-m", "er3a", "compute", *words.split()]
     told = subprocess.run(command, cwd=run.folder, env=environment, capture_output=True, text=True, check=True).stdout
     assert told == "reports/er3a_c60/validation.html can be read while the rest is computed\n"
-    assert page.read_bytes() == whole
+    assert _but_for_commit(page) == whole
+
+
+def _but_for_commit(page: Path) -> str:
+    """A page without its commit, which a copy of the project has none of."""
+    return re.sub(r"<dt>commit</dt><dd>.*?</dd>", "", page.read_text(encoding="utf-8"))
 
 
 def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_study, tmp_path):

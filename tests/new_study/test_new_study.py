@@ -346,7 +346,7 @@ def test_xacro_is_expanded_with_its_packages_arguments_and_meshes(xacro):
     arm = arm_of(xacro, xacro=("mesh:=box.stl",))
     q = np.random.default_rng(1).uniform(packaged.lower, packaged.upper, (20, 6))
     assert np.allclose(er3a.forward(arm.robot, q), er3a.forward(packaged, q), atol=1e-9)
-    assert arm.robot.name == "my_arm"
+    assert arm.robot.name == "arm"  # as the file names it
     assert np.ptp(np.array(arm.robot.hulls[0].points), axis=0) == pytest.approx([0.1] * 3, abs=1e-6)
     assert arm_of(xacro, xacro=("mesh:=ring.stl",)).robot.hulls != arm.robot.hulls
     assert [path.name for path in xacro.parent.iterdir()] == [xacro.name]

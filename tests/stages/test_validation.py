@@ -391,7 +391,7 @@ def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_views_are_written_for_each_robot(study, stored, tmp_path, name):
     page = page_of(study, stored[name], tmp_path)
-    assert page.count('class="arms"') == 1
+    assert page.count('class="arms"') == 1 + page.count('class="look"')  # the arm, and what a direction does
     assert not re.search(r"\bnan\b", page)
 
 
