@@ -1,4 +1,4 @@
-"""The solution of a pose that every stage takes: the nearest, singular ones last."""
+"""The solution that Poses and Collisions take of a target: the nearest, singular ones last."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ SINGULAR = 1e-6  # sine of an angle, m from axis 1, or singular value (no unit):
 
 
 def regular_first(robot: Robot, solutions: Solutions, q_ref: Reals, refused: Sequence[Finding | None]) -> Choice:
-    """The choice of every stage: nearest first, singular ones last: from these the tool can't move straight in every
-    direction.
+    """Nearest first, singular ones last: from these the tool can't move straight in every direction.
 
     Parameters
     ----------
