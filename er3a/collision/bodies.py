@@ -5,6 +5,7 @@ The base is not paired with the scene: it does not move, and it is mounted on so
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import compress, product
 
 import numpy as np
@@ -229,7 +230,7 @@ class Bodies:
         """
         q = np.ascontiguousarray(q, float)
         clear = np.ones(len(q), bool)
-        for layout in (self.layout,) if margin <= 0 else _apart_by(self.layout, margin):
+        for layout in (self.layout,) if margin <= 0 else _apart_by(self, margin):
             found = np.zeros((int(clear.sum()), 1), bool)
             which_overlap(layout, q[clear], found)
             clear[clear] = ~found[:, 0]
@@ -310,9 +311,11 @@ def named_pair(first: Body, second: Body) -> Pair:
     )
 
 
-def _apart_by(layout: Layout, margin: float) -> tuple[Layout, Layout]:
+@lru_cache(maxsize=4)
+def _apart_by(bodies: Bodies, margin: float) -> tuple[Layout, Layout]:
     """The pairs that no joint holds together, of bodies larger by half a margin (m) all around, and the other pairs."""
-    solid, apart, by = layout.kind != HALF_SPACE, ~layout.joined, margin / 2
+    layout, by = bodies.layout, margin / 2
+    solid, apart = layout.kind != HALF_SPACE, ~layout.joined
     points = layout.points.copy()
     points[layout.start[:-1][~solid] + 1, 0] += by
     grown = layout._replace(points=points, radius=layout.radius + by * solid, reach=layout.reach + by)

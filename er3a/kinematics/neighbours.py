@@ -17,14 +17,13 @@ from er3a.robots.robot import Robot
 
 ORIENTATIONS = 2000  # a ratio of these is known to 1 %
 TURN_GRID, SHIFT_GRID = 41, 25  # changes across at first: 9 deg, and a twelfth of the arm's reach
-FINE_GRID, REFINEMENTS = 9, 5  # changes across when refined, each time to a quarter, and how often
-
+FINE_GRID, REFINEMENTS = 5, 10  # changes across when refined, each time to a half, and how often
 
 SPARE_TURNS, SPARE_SHIFTS = np.radians([1.0, 2.0, 5.0, 10.0]), np.array([5.0, 10.0, 20.0, 50.0]) / 1000
 """Margins beyond the smallest turn (rad) or shift (m) for an advised one; the first usable margin is taken."""
 SHOWN_ANGLE, SHOWN_LENGTH = np.radians(0.01), 1e-4
 """Rounding of advised poses."""
-CHUNKS = 32 * (2 ** np.arange(1, 12) - 1)  # of changes that are tried, until one is usable: twice as many each time
+CHUNKS = 64 * (2 ** np.arange(1, 13) - 1)  # of changes that are tried, until one is usable: twice as many each time
 
 Usable = Callable[[Reals], Flags]
 """Which arms (N, n), rad, within the limits count, (N,)."""
@@ -81,7 +80,7 @@ def neighbours(robot: Robot, T: Reals, usable: Usable | None = None) -> Neighbou
     ----------
     T : (4, 4), m
     usable : which arms count. If given, the poses are fit for advice: beyond the smallest usable turn or shift by one
-        of ``SPARE_TURNS`` or ``SPARE_SHIFTS``, and usable after rounding for display
+        of ``SPARE_TURNS`` or ``SPARE_SHIFTS`` or up to a cell of the first grid, and usable after rounding for display
 
     Returns
     -------
@@ -101,7 +100,7 @@ def neighbours(robot: Robot, T: Reals, usable: Usable | None = None) -> Neighbou
     half = size_of(robot) + float(np.linalg.norm(robot.last_to_tool[:3, 3]))
     spread = _turned(T, _orientations())
     solved = solvable(robot, spread)
-    turns = usable is None or solvable(robot, spread[solved], usable).any()
+    turns = usable is None or _first(robot, spread[solved], usable) is not None
     turn = _least(robot, turned, (np.zeros(3), np.pi, TURN_GRID), usable, SPARE_TURNS) if turns else None
     shift = _least(robot, shifted, (robot.base[:3, 3] - T[:3, 3], half, SHIFT_GRID), usable, SPARE_SHIFTS)
     back = None if turn is None else scipy.spatial.transform.Rotation.from_matrix(turn[:3, :3] @ T[:3, :3].T)
@@ -127,6 +126,17 @@ def _turned(T: Reals, turns: Reals) -> Reals:
     return poses
 
 
+def _first(
+    robot: Robot, changes: Reals, usable: Usable | None, made: Callable[[Reals], Reals] = np.asarray
+) -> int | None:
+    """The first of changes (N, ...) whose pose has a usable solution; None if none has."""
+    for start, end in zip((0, *CHUNKS), CHUNKS):
+        solved = np.flatnonzero(solvable(robot, made(changes[start:end]), usable))
+        if len(solved):
+            return int(start + solved[0])
+    return None
+
+
 def _least(
     robot: Robot,
     made: Callable[[Reals], Reals],
@@ -137,23 +147,25 @@ def _least(
     """The pose (4, 4) made by the smallest change with a usable solution; None if none is found.
 
     ``grid``: centre (3,), half width and changes across of those that are tried first, rad or m. For advice the pose is
-    the first usable one made by a change that is larger by one of ``spare`` (k,), and rounded.
+    the first usable one made by a change that is larger by one of ``spare`` (k,), or by the first one found, rounded.
     """
     centre, half, count = grid
+    found: list[Reals] = []
     for _ in range(1 + REFINEMENTS):
         ticks = np.linspace(-half, half, count)
-        changes = centre + np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
-        changes = changes[np.linalg.norm(changes, axis=1).argsort(kind="stable")]
-        parts = np.split(changes, CHUNKS[len(changes) > CHUNKS])
-        solved = (part[solvable(robot, made(part), usable)] for part in parts)
-        best = next((part[0] for part in solved if len(part)), None)
+        changes = centre + ticks[np.indices((count, count, count)).reshape(3, -1).T]
+        size = np.linalg.norm(changes, axis=1)
+        # Known to 1/65535 of the largest: integers of 16 bits are sorted at once.
+        changes = changes[(size * (65535 / size.max())).astype(np.uint16).argsort(kind="stable")]
+        best = _first(robot, changes, usable, made)
         if best is None:
             return None
-        centre, half, count = best, ticks[1] - ticks[0], FINE_GRID
+        found.append(changes[best])
+        centre, half, count = found[-1], ticks[1] - ticks[0], FINE_GRID
     if usable is None:
         return np.asarray(made(centre[None])[0])
-    size = np.linalg.norm(centre)
-    poses = made(centre / size * (size + spare)[:, None])
+    spared = centre * (1 + spare[:, None] / np.linalg.norm(centre))
+    poses = made(np.vstack([spared, found[0]]))
     places, turns = (
         np.round(x / unit) * unit for x, unit in ((poses[:, :3, 3], SHOWN_LENGTH), (rpy_of(poses), SHOWN_ANGLE))
     )
