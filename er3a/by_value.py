@@ -66,6 +66,8 @@ class ByValue:
 class ReadOnly(Mapping[Key, Held]):
     """A mapping that can't be changed, and that a pickle takes."""
 
+    __slots__ = ("_content",)
+
     def __init__(self, content: Mapping[Key, Held]) -> None:
         self._content = dict(content)
 

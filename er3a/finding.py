@@ -18,7 +18,7 @@ from er3a.by_value import ReadOnly, crude_hash
 Basis = Literal["documented", "assumed"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Amount:
     """A number with its unit.
 
@@ -35,7 +35,7 @@ class Amount:
         return f"{self.value:.6g} {self.unit}".rstrip()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Finding:
     """Something that was found.
 

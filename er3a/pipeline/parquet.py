@@ -11,6 +11,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+ROWS_AT_ONCE = 1 << 17  # all texts of a million rows would take a hundred MB
+
 
 class Kept(Protocol):
     """What a file has to know of a column (``er3a.pipeline.tables.Column``)."""
@@ -34,9 +36,11 @@ def write_columns(file: Path, columns: Sequence[tuple[str, NDArray[Any], Kept, d
     file : which is replaced
     columns : name, values, what it holds, and unit and meaning, of each
     """
-    schema = [pa.field(name, _arrow_type(spec), metadata=described) for name, _, spec, described in columns]
-    arrays = [_arrow(values, spec) for _, values, spec, _ in columns]
-    pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema)), file, compression="zstd")
+    schema = pa.schema([pa.field(name, _arrow_type(spec), metadata=described) for name, _, spec, described in columns])
+    with pq.ParquetWriter(file, schema, compression="zstd") as out:
+        for start in range(0, max(len(columns[0][1]), 1), ROWS_AT_ONCE):
+            arrays = [_arrow(values[start : start + ROWS_AT_ONCE], spec) for _, values, spec, _ in columns]
+            out.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
 class ParquetColumns:
@@ -48,8 +52,8 @@ class ParquetColumns:
     """
 
     def __init__(self, content: bytes) -> None:
-        self._stored = pq.ParquetFile(pa.BufferReader(content)).read()
-        self.names: list[str] = self._stored.column_names
+        self._file = pq.ParquetFile(pa.BufferReader(content))
+        self.names: list[str] = self._file.schema_arrow.names
 
     def values(self, name: str, spec: Kept) -> Any:
         """A column's values; its own ``to_numpy`` would load pandas.
@@ -63,11 +67,13 @@ class ParquetColumns:
         -------
         values : an array, or a tuple with what each row has
         """
-        whole = self._stored[name].combine_chunks()
-        if pa.types.is_integer(whole.type) or pa.types.is_floating(whole.type):
-            return np.array(np.from_dlpack(whole))
-        rows = whole.to_pylist()
-        return tuple(map(np.array, rows) if spec.lists else rows)
+        if spec.dtype != object and spec.dtype != bool and not spec.lists:
+            return np.array(np.from_dlpack(self._file.read([name])[0].combine_chunks()))
+        parts = (batch[0].to_pylist() for batch in self._file.iter_batches(columns=[name]))
+        if spec.lists:
+            return tuple(np.array(row) for part in parts for row in part)
+        kept: dict[Any, Any] = {}  # one object for equal texts: a few of them fill a million rows
+        return tuple(kept.setdefault(each, each) for part in parts for each in part)
 
 
 def _arrow_type(spec: Kept) -> pa.DataType:

@@ -365,7 +365,8 @@ class Table(ByValue):
             parts = [_array(stored.values(part, spec), replace(spec, pattern="")) for part in names]
             arrays[name] = np.stack(parts, axis=1).astype(spec.dtype) if spec.is_group else parts[0]
             if spec.coded:
-                arrays[name] = [_decoded(text) for text in parts[0]]
+                found_in = {text: _decoded(text) for text in {*parts[0]}}
+                arrays[name] = [found_in[text] for text in parts[0]]
         found = cls(**arrays)
         if slides:
             object.__setattr__(found, "slides", slides)
@@ -390,7 +391,6 @@ def _coded(findings: NDArray[Any]) -> NDArray[Any]:
     return np.array([texts[id(finding)] for finding in findings], object)
 
 
-@cache
 def _decoded(text: str | None) -> Any:
     return None if text is None else revived(json.loads(text))
 

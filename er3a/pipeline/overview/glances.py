@@ -70,10 +70,8 @@ def _(results: CollisionResults) -> Glance:
 
 @glance.register
 def _(results: InverseResults) -> Glance:
-    targets = results.summary.targets
-    met = sum(each.outcome == "reached" for each in targets)
-    caught = sum(each.outcome != "reached" and each.outcome == each.expect for each in targets)
-    return f"{met}/{len(targets) - caught}", _caught(caught)
+    targets, caught = results.targets, int(results.targets.caught.sum())
+    return f"{targets.reached.sum()}/{len(targets) - caught}", _caught(caught)
 
 
 @glance.register(TrajectoryResults)

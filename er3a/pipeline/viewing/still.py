@@ -151,8 +151,10 @@ class Still:
 
     def picture(self) -> bytes:
         """The picture without its words, as a WebP file."""
-        whole = self.bodies[0] + SHADOW * (1 - self.bodies[0][..., 3:]) * self.shadow[0]
-        parts: Reals = np.sum([whole[i::FINE, j::FINE] for i in range(FINE) for j in range(FINE)], axis=0) / FINE**2
+        parts: Reals = np.zeros((HEIGHT, WIDTH, 4))
+        for i, j in np.ndindex(FINE, FINE):
+            body, shadow = (layer[0][i::FINE, j::FINE] for layer in (self.bodies, self.shadow))
+            parts += (body + SHADOW * (1 - body[..., 3:]) * shadow) / FINE**2
         parts[..., :3] /= np.maximum(parts[..., 3:], 1e-6)
         file = io.BytesIO()
         Image.fromarray(np.round(255 * np.clip(parts, 0, 1)).astype(np.uint8)).save(file, "webp", quality=QUALITY)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from sys import intern
 
 import numpy as np
 import scipy
@@ -272,7 +273,7 @@ def rankings(
     few = solved.solutions.take(rows)
     free = ~collides(solved.rows)[rows]
     bodies = bodies_of(robot, scene)
-    nearest = [label_of(bodies.pairs[k]) if k >= 0 else "" for k in bodies.min_distance(few.q)[1]]
+    nearest = [intern(label_of(bodies.pairs[k])) if k >= 0 else "" for k in bodies.min_distance(few.q)[1]]
     return model.RankingRows.stacked(
         model.RankingRows.of(
             few,
@@ -309,6 +310,7 @@ def _places(cost: Reals, free: Flags) -> Integers:
 STAGE_NAME = "inverse"
 REPRODUCED_M = 1e-9  # by which a solution may miss its target: far above the rounding of a solution in closed form
 REPRODUCED_RAD = 1e-9
+STACKED = 200  # tables of targets
 MAX_ADVISED = 100  # of many targets those for which it is looked for what would help
 ROUND_TRIP_STREAM = 1
 
@@ -336,7 +338,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     margin = study.assumed_margin(name)
     assumed = shapes_assumed(robot, margin, {})
     clearance = margin if assumed else motion.penetration_tolerance_mm / 1000
-    many, advised, solved = len(targets) > MANY_TARGETS, 0, list[model.TargetResult]()
+    many, advised, stacks, solved = len(targets) > MANY_TARGETS, 0, 0, list[model.TargetResult]()
     rows, ranked = list[model.SolutionRows](), list[model.RankingRows]()
     with shown_work(f"{name}: solving {len(targets)} targets"):
         for target in targets:
@@ -344,10 +346,18 @@ def compute(study: Study, name: str) -> model.InverseResults:
             one = solve_target(robot, target, scene, many=many, advise=advise, clearance=clearance)
             advised += one.result.neighbours is not None
             solved.append(one.result)
-            if len(one.rows):  # thousands of tables without rows would fill the memory
+            if len(one.rows):
                 rows.append(one.rows)
                 ranked.append(rankings(robot, target, one, scene, settings.mix))
-    solutions = model.SolutionRows.stacked(rows).of_joints(robot.slides)
+            if len(rows) - stacks == STACKED:  # thousands of tables of few rows would fill the memory
+                rows[stacks:], ranked[stacks:] = (
+                    [model.SolutionRows.stacked(rows[stacks:])],
+                    [model.RankingRows.stacked(ranked[stacks:])],
+                )
+                stacks += 1
+    solutions, ranks = model.SolutionRows.stacked(rows).of_joints(robot.slides), model.RankingRows.stacked(ranked)
+    rows.clear()
+    ranked.clear()
     results = _with_clearance(robot, scene, solved)
     asked = [each for each in results if each.chosen_deg is not None and each.expect in (None, "reached")]
     chosen = meant(robot, np.reshape([each.chosen_deg for each in asked], (-1, robot.joints)))
@@ -366,7 +376,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
         mix=settings.mix,
         scene=scene.title if scene else None,
         turns=not many,
-        targets=results,
+        targets=tuple(model.shown_targets(results)) if many else results,
         round_trips=_round_trips(trips) if trips else None,
         checked=_checked(
             results,
@@ -379,7 +389,21 @@ def compute(study: Study, name: str) -> model.InverseResults:
         ),
         assumed=(*_assumed(results), *assumed_tool(robot), *covered.assumed),
     )
-    return model.InverseResults(summary, solutions, model.RankingRows.stacked(ranked))
+    return model.InverseResults(summary, _target_rows(results), solutions, ranks)
+
+
+def _target_rows(targets: Sequence[model.TargetResult]) -> model.TargetRows:
+    return model.TargetRows.of_rows(
+        (
+            each.name,
+            each.xyz_mm,
+            each.outcome,
+            each.expect or "",
+            each.obstacle,
+            each.clearance.least_mm if each.clearance else np.nan,
+        )
+        for each in targets
+    )
 
 
 def _with_clearance(

@@ -124,6 +124,7 @@ class InverseSummary(Summary):
     mix : weights of rules that make one more rule
     scene : title of the scene whose solids are not to be touched
     turns : whether the solutions stand in all turns; else (many targets) in the one nearest to the reference
+    targets : of many only those that a page shows; all stand in the table of targets
     round_trips : None for arms without a closed form
     """
 
@@ -163,6 +164,27 @@ class SolutionRows(Table):
     distance_deg: Reals = column("root of the summed squares of the joint moves")
 
 
+class TargetRows(Table):
+    """One row for each target."""
+
+    target: Texts = column("name of the target")
+    point_mm: Reals = vector("{}_mm", "where it is, in the base frame")
+    outcome: Texts = column("what it came to")
+    expect: Texts = column("what its file says that it should come to; empty where it says nothing")
+    obstacle: Findings = findings("why none of its solutions was chosen")
+    clearance_mm: Reals = column("of the chosen solution; NaN where nothing can meet")
+
+    @property
+    def reached(self) -> Flags:
+        """Which targets (rows,) are reached."""
+        return self.outcome == "reached"
+
+    @property
+    def caught(self) -> Flags:
+        """Which targets (rows,) are not reached, as their file says."""
+        return ~self.reached & (self.outcome == self.expect)
+
+
 class RankingRows(Table):
     """Place and measure, by each rule, of each branch's best solution within the limits."""
 
@@ -179,6 +201,7 @@ class InverseResults(Results):
     """The stage's results."""
 
     summary: InverseSummary
+    targets: TargetRows
     solutions: SolutionRows
     rankings: RankingRows
 
@@ -190,7 +213,7 @@ MAX_SHOWN = 32
 
 
 def shown_targets(targets: Sequence[TargetResult]) -> list[TargetResult]:
-    """The targets that a page shows.
+    """The targets that a page shows, and of many those that the summary holds.
 
     Parameters
     ----------

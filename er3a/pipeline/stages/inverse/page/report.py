@@ -51,12 +51,13 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         study,
         stored,
         output,
-        _answer(summary, chosen),
+        _answer(results.targets, chosen),
         player=player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen)),
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target)) for target in chosen],
         sliding=_sliding(robot),
+        count=len(results.targets),
     )
 
 
@@ -75,18 +76,16 @@ def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
     return min(ranks, key=ranks.__getitem__), 0.0
 
 
-def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) -> Answer:
+def _answer(targets: model.TargetRows, shown: Sequence[model.TargetResult]) -> Answer:
     """How many targets the arm can take, and of each what came of it."""
-    met = [each for each in summary.targets if each.outcome == "reached"]
-    caught = [each for each in summary.targets if each.outcome != "reached" and each.outcome == each.expect]
-    due = len(summary.targets) - len(caught)
-    headline = tr("{count} of {due} poses reached.", count=len(met), due=due)
-    clear = [each.clearance.least_mm for each in met if each.clearance]
-    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
+    caught = int(targets.caught.sum())
+    headline = tr("{count} of {due} poses reached.", count=targets.reached.sum(), due=len(targets) - caught)
+    clear = targets.clearance_mm[np.isfinite(targets.clearance_mm)]
+    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if len(clear) else []
     rows = [_row(each) for each in shown]
     return Answer(
         headline,
-        all_caught(len(caught)),
+        all_caught(caught),
         "",
         keys,
         (

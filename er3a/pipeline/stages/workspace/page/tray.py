@@ -24,6 +24,7 @@ from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.player.player import moment
 from er3a.pipeline.results import AbsentResults, Stored, is_computed, read_stage
 from er3a.pipeline.stages.expectations import unmet_expectations
+from er3a.pipeline.stages.inverse.model import TargetRows
 from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
 from er3a.pipeline.stages.programs.page.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES
@@ -342,9 +343,11 @@ def placing(
     for stage in motions:
         unseen += [each.name for each in getattr(stored[stage].results.summary, "not_followed", ())]
     low, high = (1000 * corner for corner in best.tray.corners)
-    targets = stored["inverse"].results.summary.targets if "inverse" in stored else ()
-    inside = (each.name for each in targets if each.chosen_deg and np.all((low <= each.xyz_mm) & (each.xyz_mm <= high)))
-    return Placing((best, *(each for each in tried if each is not best)), sound, tuple(inside), tuple(unseen))
+    targets = stored["inverse"].results.targets if "inverse" in stored else TargetRows.empty()
+    inside = targets.reached & np.all((low <= targets.point_mm) & (targets.point_mm <= high), axis=1)
+    return Placing(
+        (best, *(each for each in tried if each is not best)), sound, tuple(targets.target[inside]), tuple(unseen)
+    )
 
 
 def sound_motions(results: object) -> list[str]:
