@@ -20,6 +20,7 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.validation import condition, how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.results import FORMAT_VERSION, plain, read_foundation, write_checksums
 from er3a.pipeline.scope import Open
+from er3a.pipeline.stages.inverse.model import TargetRows
 from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, TrajectoryResults
 from er3a.pipeline.stages.vision.model import PathRows, VisionResults
@@ -171,22 +172,18 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
     paths = SimpleNamespace(paths=named("into", "below", "beside"), not_followed=tuple(named("lost")))
     programs = SimpleNamespace(programs=named("through", "still"))
     motions = {"into": (99.0, 424.0), "below": (0.0, 150.0), "beside": (101.0, 400.0)}
+    places = [
+        ("on_edge", (275.0, 100.0, 425.0), "reached"),
+        ("under", (350.0, 0.0, 200.0), "reached"),
+        ("unsolved", (350.0, 0.0, 400.0), "unreachable"),
+        ("outside", (274.0, 0.0, 400.0), "reached"),
+    ]
+    targets = TargetRows.of_rows((*each, "", None, np.nan) for each in places)
     stored = {
         "workspace": placed(over=over),
         "trajectory": moving(TrajectoryResults, PathChecks, "path", paths, motions),
         "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
-        "inverse": SimpleNamespace(
-            results=SimpleNamespace(
-                summary=SimpleNamespace(
-                    targets=[
-                        SimpleNamespace(name="on_edge", xyz_mm=(275.0, 100.0, 425.0), chosen_deg=(0.0,)),
-                        SimpleNamespace(name="under", xyz_mm=(350.0, 0.0, 200.0), chosen_deg=(0.0,)),
-                        SimpleNamespace(name="unsolved", xyz_mm=(350.0, 0.0, 400.0), chosen_deg=None),
-                        SimpleNamespace(name="outside", xyz_mm=(274.0, 0.0, 400.0), chosen_deg=(0.0,)),
-                    ]
-                )
-            )
-        ),
+        "inverse": SimpleNamespace(results=SimpleNamespace(targets=targets)),
     }
     sound = {"trajectory": ["below", "beside"], "programs": ["through", "still"]}
     found = placing(stored, load_robot("er3a_c60"), {}, sound)
