@@ -365,8 +365,7 @@ class Table(ByValue):
             parts = [_array(stored.values(part, spec), replace(spec, pattern="")) for part in names]
             arrays[name] = np.stack(parts, axis=1).astype(spec.dtype) if spec.is_group else parts[0]
             if spec.coded:
-                found_in = {text: _decoded(text) for text in {*parts[0]}}
-                arrays[name] = [found_in[text] for text in parts[0]]
+                arrays[name] = [*map(cache(_decoded), parts[0])]
         found = cls(**arrays)
         if slides:
             object.__setattr__(found, "slides", slides)

@@ -19,11 +19,9 @@ from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.by_class import arm_solver, misses
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.closed_form import ORIENTATION
-from er3a.kinematics.families import Family
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import Usable, neighbours
 from er3a.kinematics.round_trips import MAX_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
-from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning
 from er3a.kinematics.solutions import MANY_TARGETS, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
@@ -113,16 +111,12 @@ def solve_target(
         q_ref_deg=target.q_ref_deg,
         solutions=len(found),
         within_limits=len(within),
-        rows_within_limits=int(rows.within_limits.sum()),
-        collide=len(np.unique(rows.branch[collides(rows)])),
         chosen_deg=None if chosen is None else tuple(rows.q_deg[chosen].tolist()),
-        chosen_branch=None if chosen is None else int(rows.branch[chosen]),
         reason=choice.reason,
         obstacle=obstacle,
         outcome=_outcome(obstacle),
         unsolved=() if is_one(choice.reason, "no_solution") else solutions.unsolved,
         method=solutions.method,
-        families=tuple(map(_self_motion, solutions.families)),
         neighbours=near,
         advice=advice,
     )
@@ -177,11 +171,6 @@ def _first_of_branch(branch: Integers, rank: Integers) -> Flags:
             seen.add(branch[row])
             first[row] = True
     return first
-
-
-def _self_motion(family: Family | SelfMotionCurve) -> model.SelfMotion:
-    direction = shown(family.robot, family.direction) / np.degrees(1.0)
-    return stated(model.SelfMotion, family, q0_deg=shown(family.robot, family.q0), direction=direction)
 
 
 def _obstacle(robot: Robot, target: Target, branches: int) -> Finding:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -31,24 +30,6 @@ class NeighbourPoses:
 
 
 @dataclass(frozen=True)
-class SelfMotion:
-    """A continuum of solutions (``kinematics.families``, ``kinematics.self_motions``).
-
-    Above a ``dimension`` of 1 it is one curve of many on a surface of solutions.
-    ``direction`` is in deg (mm of prismatic joints) per deg of the joint that is free; of kind curve per deg of its
-    length.
-    """
-
-    kind: Literal["wrist", "shoulder", "elbow", "curve"]
-    q0_deg: tuple[float, ...]
-    direction: tuple[float, ...]
-    range_deg: tuple[float, float]
-    within_limits: bool
-    branches: tuple[int, ...]
-    dimension: int
-
-
-@dataclass(frozen=True)
 class TargetClearance:
     """How near a chosen solution comes to anything, negative by the depth of an overlap, and what comes so near."""
 
@@ -62,9 +43,8 @@ class TargetResult:
 
     Attributes
     ----------
-    solutions, within_limits, collide : branches that reach it, that do so within the limits, that collide there
-    rows_within_limits : solutions within the limits, turns included
-    chosen_deg, chosen_branch : the solution taken; None if there is none
+    solutions, within_limits : branches that reach it, and that do so within the limits
+    chosen_deg : the solution taken; None if there is none
     reason : why it was taken, or why none was; obstacle : the latter in short, None where one was taken
     outcome, expect : what it came to, and what its file says that it should
     unsolved : why branches have no solution, where others have one; else ``reason`` says why
@@ -80,17 +60,13 @@ class TargetResult:
     q_ref_deg: tuple[float, ...]
     solutions: int
     within_limits: int
-    rows_within_limits: int
-    collide: int
     chosen_deg: tuple[float, ...] | None
-    chosen_branch: int | None
     reason: WhyFirst | Finding
     obstacle: Finding | None
     outcome: TargetOutcome
     expect: TargetOutcome | None
     unsolved: tuple[Unsolved, ...]
     method: Method
-    families: tuple[SelfMotion, ...]
     neighbours: NeighbourPoses | None
     advice: tuple[Finding, ...]
     clearance: TargetClearance | None = None
