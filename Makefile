@@ -59,7 +59,7 @@ words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeli
 		--ignore-pot-creation-date
 	rm $(LOCALE)/er3a.pot
 
-campaigns: $(VENV)/dev.stamp  ## evidence whose code has changed, again (ARGS="motion --again", ARGS="--share 0.01")
+campaigns: $(VENV)/speed.stamp  ## evidence whose code has changed, again (ARGS="motion --again", ARGS="--share 0.01")
 	$(BIN)/python -m benchmarks.campaigns $(ARGS)
 
 docs: $(VENV)/docs.stamp  ## build the documentation site in docs/_build/html; warnings and broken links are errors
@@ -78,6 +78,8 @@ lock: $(VENV)/uv.stamp  ## resolve the locked requirements again
 	@$(UV) pip compile pyproject.toml --extra build --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt
 	@$(UV) pip compile pyproject.toml --extra build --extra study -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
 	@$(UV) pip compile pyproject.toml --extra build --extra study --extra docs -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/docs.txt
+	@$(UV) pip compile pyproject.toml --extra build --extra dev --extra peers --extra speed -c requirements/dev.txt $(LOCK_FLAGS) \
+		-o requirements/speed.txt
 	@echo uv >$(VENV)/uv.in
 	@$(UV) pip compile $(VENV)/uv.in $(LOCK_FLAGS) -o requirements/uv.txt
 

@@ -18,21 +18,35 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
+import ik_geo
 import numpy as np
 import pinocchio
 import roboticstoolbox as rtb
+import ruckig
+import ssik
 from eaik.IK_DH import DhRobot
+from eaik.IK_HP import HPRobot
+from py_opw_kinematics import KinematicModel
+from py_opw_kinematics import Robot as OpwRobot
+from scipy.spatial.transform import RigidTransform
 
 from benchmarks.campaign_kinematics import pinocchio_model
-from er3a import forward, inverse_batch, jacobian, load_robot, solve
+from er3a import forward, inverse, inverse_batch, jacobian, load_robot, solve
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.solutions import Solutions
+from er3a.planning.timing import joint_limits, straight
+from er3a.sampling.grid import make_grid
+from er3a.sampling.random_joints import Draw
+from er3a.sampling.tally import tally_blocks
 from testing.evidence import sized
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 PARTS = 100
+PEERS = ("eaik", "ik-geo", "ssik", "py-opw-kinematics", "ruckig", "roboticstoolbox-python", "pin", "numba")
+SINGLE = (("er3a_c60", "spherical_two_parallel"), ("ur5e", "three_parallel_two_intersecting"), ("panda", ""))
 POSES, FORWARD_POSES, NUMERICAL_POSES, PEER_POSES = (sized(n) for n in (100_000, 1_000_000, 10_000, 5_000))
+SINGLE_POSES, MOVES = sized(300), 40
 SEED, ROUNDS = 20261120, 7
 THREAD_ROUNDS = 40
 
@@ -233,12 +247,110 @@ def to_a_nanometre(robot, q: np.ndarray, asked: np.ndarray) -> float:
     return float((near & (rotation_angle(T[:, :3, :3], asked[:, :3, :3]) < 1e-9)).mean())
 
 
+def exponentials(robot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """An arm as EAIK, ik-geo and ssik take it: axes (n, 3) and offsets (n + 1, 3), m, at zero, and the tool's rotation.
+
+    Points of axes that meet the next one are where they meet: the solvers know a wrist by that.
+    """
+    J, T = jacobian(robot, np.zeros(robot.joints)), forward(robot, np.zeros(robot.joints))
+    axes = J[3:].T
+    points = T[:3, 3] + np.cross(axes, J[:3].T)
+    for k in range(1, robot.joints):
+        across = np.cross(axes[k - 1], axes[k])
+        if np.linalg.norm(across) > 1e-9 and abs(across @ (points[k] - points[k - 1])) < 1e-9:
+            s = np.linalg.lstsq(np.stack([axes[k - 1], -axes[k]], axis=1), points[k] - points[k - 1])[0][0]
+            points[k - 1 : k + 1] = points[k - 1] + s * axes[k - 1]
+    return axes, np.diff([np.zeros(3), *points, T[:3, 3]], axis=0), T[:3, :3]
+
+
+def single_rows(name: str, kind: str, random) -> list[str]:
+    """All solutions of one pose after the other, with whole turns: er3a and peers."""
+    robot = load_robot(name)
+    q = random.uniform(robot.lower, robot.upper, (SINGLE_POSES, robot.joints))
+    T = forward(robot, q)
+    axes, offsets, turned = exponentials(robot)
+    asked = T.copy()
+    asked[:, :3, :3] = T[:, :3, :3] @ turned.T
+    theirs = ssik.Manipulator.from_axes(axes, offsets, limits=np.stack([robot.lower, robot.upper], axis=1))
+    runs: dict[str, Callable[[int], object]] = {
+        "er3a `inverse`": lambda n: inverse(robot, T[n]).q,
+        "er3a `inverse`, from where the arm is": lambda n: inverse(robot, T[n], q[n]).q,
+        "ssik `solve`": lambda n: [each.q for each in theirs.solve(asked[n])],
+    }
+    if kind:
+        geo = getattr(ik_geo.Robot, kind)(axes.tolist(), offsets.tolist())
+        eaik = HPRobot(axes, offsets)
+        runs |= {
+            f"ik-geo `{kind}`": lambda n: [row[0] for row in geo.get_ik(asked[n, :3, :3], asked[n, :3, 3])],
+            "EAIK `IK`": lambda n: eaik.IK(asked[n]).Q,
+        }
+    if (
+        name == "er3a_c60"
+    ):  # the one of these arms that OPW's seven lengths describe; their zero is the arm stretched up
+        opw = OpwRobot(KinematicModel(*opw_lengths(robot)), degrees=False)
+        poses = [RigidTransform.from_matrix(each) for each in T]
+        runs["OPW `inverse`"] = lambda n: opw.inverse(poses[n])
+    times = least_times(SINGLE_POSES, *(partial(each_pose, run) for run in runs.values()), rounds=3)
+    counts = [np.mean([len(run(n)) for n in range(SINGLE_POSES)]) for run in runs.values()]
+    return [f"| {name} | {what} | {ns / 1000:.1f} | {count:.1f} |" for what, ns, count in zip(runs, times, counts)]
+
+
+def each_pose(run: Callable[[int], object]) -> None:
+    """One pose after the other."""
+    for n in range(SINGLE_POSES):
+        run(n)
+
+
+def opw_lengths(robot) -> tuple[float, ...]:
+    """a1, a2, b, c1, c2, c3, c4 (m) of an arm whose elbow's offset is its third row's length."""
+    return (
+        robot.a[0],
+        -robot.a[2],
+        0.0,
+        robot.base[2, 3] + robot.d[0],
+        robot.a[1],
+        robot.d[3],
+        robot.last_to_tool[2, 3] + robot.d[5],
+    )
+
+
+def other_rows(random) -> list[str]:
+    """Samples a second, and joint moves from rest to rest beside Ruckig's."""
+    robot, samples = load_robot("er3a_c60"), sized(64_000_000)
+    grid, draw = make_grid(robot, 56), Draw(SEED, samples, 1)
+    (sampled,) = least_times(samples, lambda: tally_blocks(robot, grid, draw, [0]), rounds=3)
+    limits, moves = joint_limits(robot, np.full(6, 2.0), 0.4), random.uniform(robot.lower, robot.upper, (MOVES, 2, 6))
+    made = ruckig.Ruckig(6)
+
+    def theirs(start: np.ndarray, end: np.ndarray) -> float:
+        asked, found = ruckig.InputParameter(6), ruckig.Trajectory(6)
+        asked.current_position, asked.target_position = start.tolist(), end.tolist()
+        asked.max_velocity, asked.max_acceleration = limits.speed.tolist(), limits.acceleration.tolist()
+        asked.max_jerk = [float("inf")] * 6
+        asked.synchronization = ruckig.Synchronization.Phase
+        made.calculate(asked, found)
+        return found.duration
+
+    def ours(start: np.ndarray, end: np.ndarray) -> float:
+        return float(straight(start, end, limits).t[-1])
+
+    least = least_times(MOVES, *(partial(list, (run(*move) for move in moves)) for run in (theirs, ours)))
+    longer = max(ours(*move) / theirs(*move) - 1 for move in moves)
+    return [
+        f"{1e3 / sampled:.0f} million samples a second and thread, drawn, through forward kinematics and counted.",
+        "",
+        f"A joint move from rest to rest takes er3a {least[1] / 1000:.0f} us, as it is timed like a path, by TOPP-RA;",
+        f"Ruckig {least[0] / 1000:.0f} us. er3a's lasts at most {longer:.1%} longer.",
+        "",
+    ]
+
+
 def table() -> str:
     """The evidence as Markdown."""
     pinned({0})
     random = np.random.default_rng(SEED)
     robots = [load_robot(name) for name in ROBOTS]
-    peers = ", ".join(f"{name} {version(name)}" for name in ("eaik", "roboticstoolbox-python", "pin", "numba"))
+    peers = ", ".join(f"{name} {version(name)}" for name in PEERS)
     return "\n".join(
         [
             "# Speed beside the peers, with accuracy",
@@ -256,6 +368,19 @@ def table() -> str:
             "|---|---|---|---|---|",
             *(line for robot in robots for line in inverse_rows(robot, random)),
             "",
+            f"## One pose after the other ({SINGLE_POSES} poses)",
+            "",
+            "*Solutions*: of the mean pose, within the limits and with whole turns for er3a and ssik; others know no",
+            "limits. Without a reference er3a holds the Panda's joint 7 at 0; where a pose has no solution there, its",
+            "self-motions are traced.",
+            "",
+            "| robot | what | us a pose | solutions |",
+            "|---|---|---|---|",
+            *(line for name, kind in SINGLE for line in single_rows(name, kind, random)),
+            "",
+            "## Sampling and joint moves",
+            "",
+            *other_rows(random),
             f"## Forward kinematics ({FORWARD_POSES:,} poses) and Jacobians ({POSES:,})",
             "",
             "The C loops (benchmarks/bare_loop.c) fill memory that is used again.",

@@ -50,6 +50,7 @@ STARTS, FEW_STARTS = 240, 32  # random starts in the search for self-motions; fe
 TRACED: dict[ArmClassCode, int] = {"free_roll": OPEN_ROLL, "position": POSITION}
 SMALLEST_PART = 64  # poses that are worth a thread's start
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
+TRIED, CLOSER = 32, 3  # values that are tried where the one asked for has no rows; how often closer ones are
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,18 +292,49 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
     solver = arm_solver(robot)
     if isinstance(solver.chain, ArmAngle) and is_out_of_reach(solver.chain.arm, T):
         return Settled(np.empty((0, robot.joints)))
-    span = np.linspace(-np.pi, np.pi, SCANNED, endpoint=False)
-    parameter = parameters_of(robot)[0]
-    if parameter.joint >= 0:
-        j = parameter.joint
-        if robot.sliding[j]:
-            low, high = row_limits(robot)[j].tolist()
-            span = np.linspace(low, high, SCANNED)
-        span = robot.direction[j] * span + joint_starts(robot)[j]
-    grid = np.concatenate([values, span[:, None]])
+    grid = np.concatenate([values, _scanned(robot, SCANNED)])
     q = class_rows(robot, np.broadcast_to(T, (len(grid), 4, 4)), grid).q.reshape(-1, robot.joints)
     more = to_joints(robot, solver.poses_at(T).roots(_starts(robot, STARTS)))  # curves between the values scanned
     return settle(robot, T, np.concatenate([q[np.isfinite(q[:, 0])], more]), q_ref, values, CERTAIN)
+
+
+def _scanned(robot: Robot, count: int) -> Reals:
+    """Values (count, 1) of the redundancy parameter all over its range, as the solver takes them."""
+    span, joint = np.linspace(-np.pi, np.pi, count, endpoint=False), parameters_of(robot)[0].joint
+    if joint >= 0:
+        if robot.sliding[joint]:
+            low, high = row_limits(robot)[joint].tolist()
+            span = np.linspace(low, high, count)
+        span = robot.direction[joint] * span + joint_starts(robot)[joint]
+    return span[:, None]
+
+
+def nearest_value(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Reals:
+    """The value of the redundancy parameter, near a given one, at which a pose has rows.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    q_ref : (n,), rad or m
+    values : (1, 1), rad or m, the value that is asked for, see :func:`checked_parameters`
+
+    Returns
+    -------
+    values : (1, 1), at which rows are within the limits if there is one among those that are tried, else as given
+    """
+    tried, parameter = _scanned(robot, TRIED), parameters_of(robot)[0]
+    turns = parameter.joint < 0 or not robot.sliding[parameter.joint]
+    step = tried[1] - tried[0]
+    for _ in range(1 + CLOSER):
+        away = np.abs(np.remainder(tried - values + np.pi, 2 * np.pi) - np.pi if turns else tried - values)
+        tried = tried[away[:, 0].argsort(kind="stable")]
+        q = nearest_equivalent(robot, class_rows(robot, np.broadcast_to(T, (len(tried), 4, 4)), tried).q, q_ref)
+        fits = np.flatnonzero(within(robot, q).any(axis=1))
+        if not fits.size:
+            return values
+        found = tried[fits[:1]]
+        tried, step = found + step * np.linspace(-1, 1, 9)[:, None], step / 4
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,9 +68,9 @@ def inverse(
     q_ref : (n,), rad or m, reference for the choice of members of self-motions and of whole turns: in each branch the
         nearest turn comes first. None means zeros.
     redundancy : (k,), values of the redundancy parameters (``parameters_of``): an arm angle in rad, or a joint's value;
-        None means those of ``q_ref``
+        None means those of ``q_ref``; where a pose has no rows, the nearest value at which it has some is taken
     self_motion_rows : for an arm with one redundancy parameter, add for each self-motion the member nearest to
-        ``q_ref`` and the one with the largest limit margin as rows; always done if no row has the parameter's value
+        ``q_ref`` and the one with the largest limit margin as rows; always done if rows have no parameter's value
 
     Returns
     -------
@@ -235,6 +235,9 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
         return _by_iteration(robot, T, q_ref)
     values = by_class.checked_parameters(robot, redundancy, q_ref[None], 1)
     found = by_class.slots_of_class(robot, T[None], q_ref[None], values)
+    if len(solver.parameters) == 1 and not np.isfinite(found.q).any():
+        values = by_class.nearest_value(robot, T, q_ref, values)
+        found = by_class.slots_of_class(robot, T[None], q_ref[None], values)
     slots, motions = found.q[0], found.settled[0].motions if found.settled else ()
     filled = np.flatnonzero(np.isfinite(slots[:, 0]))
     traced: Sequence[SelfMotionCurve] = motions

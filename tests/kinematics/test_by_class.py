@@ -145,6 +145,24 @@ def test_self_motions_of_a_redundant_arm_are_traced_when_looked_at(random, monke
             assert np.abs(whole.q - member).max(axis=1).min() < 1e-6
 
 
+def test_a_pose_without_rows_at_the_held_joint_has_those_nearest_to_it(random):
+    robot = arm(PANDA, most=2.6)
+    held, grid, seen = parameters_of(robot)[0].joint, np.linspace(-np.pi, np.pi, 721)[:, None], 0
+    for q in random.uniform(robot.lower, robot.upper, (12, 7)):
+        T = forward(robot, q)
+        rows = inverse_batch(robot, np.broadcast_to(T, (721, 4, 4)), redundancy=grid)
+        at_zero = rows.solved[360].any()
+        if at_zero or not rows.within_limits.any():
+            continue
+        seen += 1
+        found = inverse(robot, T)
+        nearest = np.abs(grid[rows.within_limits.any(axis=1)]).min()
+        assert np.abs(forward(robot, found.q) - T).max() < 1e-9
+        assert found.within_limits.any()
+        assert np.abs(found.q[found.within_limits, held]).max() <= nearest + np.radians(0.5)
+    assert seen > 2
+
+
 def test_parameters_of_redundant_arms(random):
     assert [each.code for each in parameters_of(ARMS["arm_angle"][0])] == ["arm_angle"]
     panda, _ = ARMS["redundant"]
