@@ -334,7 +334,9 @@ def other_rows(random) -> list[str]:
     def ours(start: np.ndarray, end: np.ndarray) -> float:
         return float(straight(start, end, limits).t[-1])
 
-    least = least_times(MOVES, *(partial(list, (run(*move) for move in moves)) for run in (theirs, ours)))
+    least = least_times(
+        MOVES, lambda: [theirs(*move) for move in moves], lambda: [ours(*move) for move in moves], rounds=3
+    )
     longer = max(ours(*move) / theirs(*move) - 1 for move in moves)
     return [
         f"{1e3 / sampled:.0f} million samples a second and thread, drawn, through forward kinematics and counted.",
