@@ -73,14 +73,14 @@ def solvable(robot: Robot, T: Reals, usable: Usable | None = None) -> Flags:
     return solved
 
 
-def neighbours(robot: Robot, T: Reals, usable: Usable | None = None) -> Neighbours:
+def neighbours(robot: Robot, T: Reals, usable: Usable) -> Neighbours:
     """Search poses near a refused one that have a solution within the limits.
 
     Parameters
     ----------
     T : (4, 4), m
-    usable : which arms count. If given, the poses are fit for advice: beyond the smallest usable turn or shift by one
-        of ``SPARE_TURNS`` or ``SPARE_SHIFTS`` or up to a cell of the first grid, and usable after rounding for display
+    usable : which arms count. The poses are beyond the smallest usable turn or shift by one of ``SPARE_TURNS`` or
+        ``SPARE_SHIFTS`` or up to a cell of the first grid, and usable after rounding for display
 
     Returns
     -------
@@ -100,7 +100,7 @@ def neighbours(robot: Robot, T: Reals, usable: Usable | None = None) -> Neighbou
     half = size_of(robot) + float(np.linalg.norm(robot.last_to_tool[:3, 3]))
     spread = _turned(T, _orientations())
     solved = solvable(robot, spread)
-    turns = usable is None or _first(robot, spread[solved], usable) is not None
+    turns = _first(robot, spread[solved], usable) is not None
     turn = _least(robot, turned, (np.zeros(3), np.pi, TURN_GRID), usable, SPARE_TURNS) if turns else None
     shift = _least(robot, shifted, (robot.base[:3, 3] - T[:3, 3], half, SHIFT_GRID), usable, SPARE_SHIFTS)
     back = None if turn is None else scipy.spatial.transform.Rotation.from_matrix(turn[:3, :3] @ T[:3, :3].T)
@@ -126,9 +126,7 @@ def _turned(T: Reals, turns: Reals) -> Reals:
     return poses
 
 
-def _first(
-    robot: Robot, changes: Reals, usable: Usable | None, made: Callable[[Reals], Reals] = np.asarray
-) -> int | None:
+def _first(robot: Robot, changes: Reals, usable: Usable, made: Callable[[Reals], Reals] = np.asarray) -> int | None:
     """The first of changes (N, ...) whose pose has a usable solution; None if none has."""
     for start, end in zip((0, *CHUNKS), CHUNKS):
         solved = np.flatnonzero(solvable(robot, made(changes[start:end]), usable))
@@ -141,12 +139,12 @@ def _least(
     robot: Robot,
     made: Callable[[Reals], Reals],
     grid: tuple[Reals, float, int],
-    usable: Usable | None,
+    usable: Usable,
     spare: Reals,
 ) -> Reals | None:
     """The pose (4, 4) made by the smallest change with a usable solution; None if none is found.
 
-    ``grid``: centre (3,), half width and changes across of those that are tried first, rad or m. For advice the pose is
+    ``grid``: centre (3,), half width and changes across of those that are tried first, rad or m. The pose is
     the first usable one made by a change that is larger by one of ``spare`` (k,), or by the first one found, rounded.
     """
     centre, half, count = grid
@@ -162,8 +160,6 @@ def _least(
             return None
         found.append(changes[best])
         centre, half, count = found[-1], ticks[1] - ticks[0], FINE_GRID
-    if usable is None:
-        return np.asarray(made(centre[None])[0])
     spared = centre * (1 + spare[:, None] / np.linalg.norm(centre))
     poses = made(np.vstack([spared, found[0]]))
     places, turns = (
