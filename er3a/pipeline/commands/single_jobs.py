@@ -44,6 +44,7 @@ def compute(
     """Compute a stage: tables and summary.json."""
     from er3a.pipeline.stages import run
 
+    show = show and _known(show, STAGES)
     for name in [_known(each, STAGES) for each in stage.split(",")]:
         loaded = load_study(study)  # for each: what is noted while files are read belongs to the stage that reads them
         folder = results / robot / name
