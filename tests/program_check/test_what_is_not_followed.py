@@ -12,8 +12,7 @@ from er3a.files.robot_library import load_robot
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import ArmMotion, JointTarget
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program
 
 ROBOT = load_robot("er3a_c60")
 START = np.radians([0, -20, 10, 0, 30, 0])
