@@ -438,25 +438,20 @@ class Obstacles:
 
     def _corners(self, execution: Execution) -> Iterator[tuple[CheckedMotion, CheckedMotion]]:
         """Motions that follow each other, each pair once."""
-        motions = self.motions
-        last: dict[int, int] = {-1: -1}  # by step, the last motion up to it
+        joins: dict[int, list[int]] = defaultdict(list)  # by step, the last ones of ways that go on with it
+        for ending in execution.endings:
+            if ending.repeats_from is not None:
+                joins[ending.repeats_from].append(ending.step)
+        last: dict[int, set[int]] = {-1: set()}  # by step, the motions that may be the last up to it
         pairs: dict[tuple[int, int], tuple[CheckedMotion, CheckedMotion]] = {}
-        following: dict[int, list[int]] = defaultdict(list)
-        for number, step in enumerate(execution.steps):
-            before = last[step.before]
-            last[number] = number if number in motions else before
-            following[step.before].append(number)
-            if number in motions and before >= 0:
-                pairs.setdefault((id(motions[before]), id(motions[number])), (motions[before], motions[number]))
-        first: dict[int, list[int]] = {}  # by step, the first motions on the ways that go on with it
-        for number in range(len(execution.steps) - 1, -1, -1):
-            on = [number] if number in motions else [each for one in following[number] for each in first[one]]
-            first[number] = list(dict.fromkeys(on))
-        for ending in execution.endings:  # which joins where the first motion behind may not be the next step
-            if ending.repeats_from is not None and last[ending.step] >= 0:
-                for number in first[ending.repeats_from]:
-                    one, other = motions[last[ending.step]], motions[number]
-                    pairs.setdefault((id(one), id(other)), (one, other))
+        for _ in range(2):  # the second time with what joins from further on
+            for number, step in enumerate(execution.steps):
+                before = set().union(*(last.get(each, ()) for each in (step.before, *joins[number])))
+                if number not in self.motions:
+                    last[number] = before
+                    continue
+                last[number], other = {number}, self.motions[number]
+                pairs |= {(id(one), id(other)): (one, other) for one in map(self.motions.__getitem__, sorted(before))}
         yield from pairs.values()
 
     def _corner(self, one: CheckedMotion, other: CheckedMotion) -> None:

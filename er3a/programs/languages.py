@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -202,22 +203,15 @@ def execute(
     ShapeError, PoseError
         for a start without one value for each joint, and a frame that is not a rigid transform
     """
-    if robot is not None and (reason := not_written(program.language, robot)):
-        raise InputError(program.file, None, reason, "Give the arm that the program is meant for")
-    if robot is not None and start is not None and np.shape(start) != robot.lower.shape:
-        raise ShapeError("start", np.shape(start), f"({len(robot.lower)},)")
-    flange = None
-    if robot is not None:
-        bare = robot.without_tool().replace(base=np.eye(4))
-
-        def flange(joints: Reals) -> Reals:
-            """T_robot_flange (..., 4, 4), m, of joints (..., n), rad or m."""
-            return forward(bare, joints)
-
     known = {name: check_poses(pose, name) for name, pose in (frames or {}).items()}
-    cell = Cell(flange, start, frames=known)
+    cell = Cell(None, start, frames=known)
     if robot is not None:
-        cell = replace(cell, joints=robot.joints, tool=robot.tool, base=np.eye(4))
+        if reason := not_written(program.language, robot):
+            raise InputError(program.file, None, reason, "Give the arm that the program is meant for")
+        if start is not None and np.shape(start) != robot.lower.shape:
+            raise ShapeError("start", np.shape(start), f"({len(robot.lower)},)")
+        bare = robot.without_tool().replace(base=np.eye(4))
+        cell = Cell(partial(forward, bare), start, robot.joints, known, robot.tool, np.eye(4))
     dialect = LANGUAGES[program.language].dialect()
     return Machine(program, dialect, cell, limits or RunLimits(), mover).run()
 
