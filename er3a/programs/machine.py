@@ -37,6 +37,7 @@ from er3a.programs.syntax import (
 )
 
 IN_ONE_PLACE = 8  # ways, before what differs between them becomes unknown
+NEARLY_OVER = 0.1  # of the operations: from there on one way goes on in each place, so that all end
 STATE_COST = 10  # operations, as many as which the comparison of a state with others counts
 OTHERWISE = "%otherwise"  # what makes motions go otherwise, and is not followed
 UNKNOWN_ROUNDS = 12  # of a loop that only something unknown ends, before what it changes becomes unknown
@@ -201,11 +202,12 @@ class Machine:
 
     def _joined(self, ways: list[Way]) -> list[Way]:
         """Ways in one place, those in one state as one; of too many one in which what differs is unknown: first for
-        each position of the arm, then for all."""
+        each position of the arm, then for all. Rather than to cut ways, few operations leave one in each place."""
+        most = IN_ONE_PLACE if self.budget > NEARLY_OVER * self.limits.operations else 1
         kept = self._one_of_each(ways, self._state) if len(ways) > 1 else ways
-        if len(kept) > IN_ONE_PLACE:
+        if len(kept) > most:
             kept = self._one_of_each(kept, lambda way: way.memory.here.key())
-        return self._one_of_each(kept, lambda way: 0) if len(kept) > IN_ONE_PLACE else kept
+        return self._one_of_each(kept, lambda way: 0) if len(kept) > most else kept
 
     def _one_of_each(self, ways: list[Way], key: Callable[[Way], Hashable]) -> list[Way]:
         kept: dict[Hashable, Way] = {}
@@ -398,6 +400,8 @@ class Machine:
             self._round(other, at)
         if self._waiting() + 1 >= self.limits.ways:
             self.pending = {where: self._joined(here) for where, here in self.pending.items()}
+        if self._waiting() + 1 >= self.limits.ways:  # then one way in each place, for all that come to it
+            self.pending = {where: self._one_of_each(here, lambda way: 0) for where, here in self.pending.items()}
         if self._waiting() + 1 < self.limits.ways:
             self._wait(other)
         else:
