@@ -215,3 +215,11 @@ def test_each_run_of_a_random_program_does_what_was_followed(seed, tmp_path):
         for line, angle in done:
             here = line + head.count("\n")
             assert here in unknown or (here, angle) in followed
+
+
+def test_ways_of_too_many_sides_are_joined_and_not_cut(tmp_path):
+    """What differs between them is unknown then: a motion by it is not followed, and one without it passes."""
+    sides = "".join(f"IF $IN[{number}] THEN\nM={number}\n" for number in range(1, 6)) + "ENDIF\n" * 5
+    check = checked(tmp_path, krl(f"M=0\n{sides}{AXES}\nPTP {{A1 M}}"), limits=RunLimits(ways=3))
+    assert check.execution.complete
+    assert [(each.level in ("pass", "note"), each.followed) for each in check.verdicts] == [(True, True), (False, False)]
