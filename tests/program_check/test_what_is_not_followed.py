@@ -222,4 +222,7 @@ def test_ways_of_too_many_sides_are_joined_and_not_cut(tmp_path):
     sides = "".join(f"IF $IN[{number}] THEN\nM={number}\n" for number in range(1, 6)) + "ENDIF\n" * 5
     check = checked(tmp_path, krl(f"M=0\n{sides}{AXES}\nPTP {{A1 M}}"), limits=RunLimits(ways=3))
     assert check.execution.complete
-    assert [(each.level in ("pass", "note"), each.followed) for each in check.verdicts] == [(True, True), (False, False)]
+    assert [(each.level in ("pass", "note"), each.followed) for each in check.verdicts] == [
+        (True, True),
+        (False, False),
+    ]
