@@ -49,9 +49,9 @@ if TYPE_CHECKING:
     from er3a.planning.toolbox import zyz as zyz
     from er3a.program_check.check_program import CheckOptions as CheckOptions
     from er3a.program_check.check_program import check_program as check_program
+    from er3a.programs.languages import execute as execute
     from er3a.programs.languages import read_program as read_program
     from er3a.programs.languages import write_program as write_program
-    from er3a.programs.machine import execute as execute
     from er3a.programs.writing import WriteOptions as WriteOptions
     from er3a.robots.masses import Load as Load
     from er3a.robots.robot import Robot as Robot
@@ -112,7 +112,7 @@ _PUBLIC = {
     "import_urdf": "er3a.formats.urdf",
     "export_urdf": "er3a.formats.urdf",
     "read_program": "er3a.programs.languages",
-    "execute": "er3a.programs.machine",
+    "execute": "er3a.programs.languages",
     "check_program": "er3a.program_check.check_program",
     "CheckOptions": "er3a.program_check.check_program",
     "write_program": "er3a.programs.languages",

@@ -9,8 +9,7 @@ import numpy as np
 from er3a.files.robot_library import load_robot
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import ArmMotion, numbers_of
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program
 
 ROBOT = load_robot("er3a_c60")
 HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])

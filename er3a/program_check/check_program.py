@@ -8,8 +8,9 @@ nothing.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -46,12 +47,11 @@ from er3a.program_check.program_check_findings import (
     with_touches_of,
     worst_of,
 )
-from er3a.program_check.sanity import suspect_numbers
+from er3a.program_check.sanity import doubtful_settings
 from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
-from er3a.programs.execution import Ending, Execution, RunLimits
-from er3a.programs.instructions import ArmMotion, Load, Pause, Place, PoseTarget, Unknown
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.execution import Execution, RunLimits, Step
+from er3a.programs.instructions import Load, Pause, Place, PoseTarget, Unknown
+from er3a.programs.languages import execute, read_program
 from er3a.programs.syntax import Program
 from er3a.robots.robot import Robot
 
@@ -243,21 +243,23 @@ def check_program(program: Program | str | Path, robot: Robot, options: CheckOpt
     motions = {number: execution.steps[number].moved for number in execution.motions}
     obstacles = None
     if options.measures:
-        tools = [each.motion.tool.pose for each in motions.values() if each.motion.tool.pose is not None]
-        around = options.penetration_tolerance, options.assumed_margin
-        obstacles = Obstacles(robot, options.scene, tools, *around)
-        obstacles.check(list(judge.motions.values()), options.keep_on)
-        for one, other in _corners(execution, motions):
-            obstacles.corner(one, other)
-    located = _located(execution, robot, motions, obstacles)
-    verdicts = _verdicts(program, execution, motions, located)
-    level: Level = worst_of(each.level for each in located)
+        obstacles = Obstacles(robot, options.scene, motions, options.penetration_tolerance, options.assumed_margin)
+        obstacles.check(execution, options.keep_on)
     main = execution.main() if execution.endings else None
     way = () if main is None else execution.way(main)
-    shapes = shapes_assumed(robot, options.assumed_margin, {}) if options.measures else None
-    checked = _checks(robot, options, motions)
+    again = None if main is None else execution.round_from(main)
+    unreached = execution.unreached
+    located = _located(execution, robot, motions, unreached, obstacles)
     return ProgramCheck(
-        execution, level, located, verdicts, motions, way, _cycle(execution, motions, main, way), checked, shapes
+        execution,
+        worst_of(each.level for each in located),
+        located,
+        _verdicts(execution, motions, unreached, located),
+        motions,
+        way,
+        _cycle(execution, motions, way if again is None else way[way.index(again) :], again is not None),
+        _checks(robot, options, motions),
+        shapes_assumed(robot, options.assumed_margin, {}) if options.measures else None,
     )
 
 
@@ -273,76 +275,51 @@ def _checks(robot: Robot, options: CheckOptions, motions: Mapping[int, CheckedMo
     return tuple(checked)
 
 
-def _corners(
-    execution: Execution, motions: Mapping[int, CheckedMotion]
-) -> Iterator[tuple[CheckedMotion, CheckedMotion]]:
-    """Motions that follow each other, each pair once."""
-    last: dict[int, int] = {-1: -1}  # by step, the last motion up to it
-    pairs: dict[tuple[int, int], tuple[CheckedMotion, CheckedMotion]] = {}
-    for number, step in enumerate(execution.steps):
-        before = last[step.before]
-        last[number] = number if number in motions else before
-        if number in motions and before >= 0:
-            pairs.setdefault((id(motions[before]), id(motions[number])), (motions[before], motions[number]))
-    following: dict[int, list[int]] = defaultdict(list)
-    for number, step in enumerate(execution.steps):
-        following[step.before].append(number)
-    first: dict[int, list[int]] = {}  # by step, the first motions on the ways that go on with it
-    for number in range(len(execution.steps) - 1, -1, -1):
-        on = [number] if number in motions else [each for one in following[number] for each in first[one]]
-        first[number] = list(dict.fromkeys(on))
-    for ending in execution.endings:  # which joins where the first motion behind may not be the next step
-        if ending.repeats_from is not None and last[ending.step] >= 0:
-            for number in first[ending.repeats_from]:
-                one, other = motions[last[ending.step]], motions[number]
-                pairs.setdefault((id(one), id(other)), (one, other))
-    yield from pairs.values()
-
-
 def _located(
-    execution: Execution, robot: Robot, motions: Mapping[int, CheckedMotion], obstacles: Obstacles | None
+    execution: Execution,
+    robot: Robot,
+    motions: Mapping[int, CheckedMotion],
+    unreached: Mapping[Place, str],
+    obstacles: Obstacles | None,
 ) -> tuple[LocatedFinding, ...]:
     """All findings, like ones of an instruction grouped."""
-    program, top = execution.program, Place(execution.program.file)
-    found = [LocatedFinding(level_of(each), each, _place_of(each, top)) for each in program.findings]
-    named = {step.instruction.text for step in execution.steps if isinstance(step.instruction, Unknown)}
+    program, steps = execution.program, execution.steps
+    top = Place(program.file)
+    found = [LocatedFinding(level_of(each), each, top) for each in program.findings]
+    named = {step.instruction.text for step in steps if isinstance(step.instruction, Unknown)}
     for number, motion in motions.items():
-        step = execution.steps[number]
+        step = steps[number]
         for finding, moment in motion.findings.items():
             # What follows from an instruction that is named at its own line is no second question.
-            told = is_one(finding, "not_followed") and finding.text in named
-            level: Level = "note" if told else motion.level_of(finding)
+            known = is_one(finding, "not_followed") and finding.text in named
+            level: Level = "note" if known else level_of(finding, motion.guessed)
             found.append(LocatedFinding(level, finding, step.place, step.calls, 1, number, moment))
-    for step in execution.steps:
-        if isinstance(what := step.instruction, Unknown):
-            reason: NotFollowedReason = "setting" if what.shapes and not what.may_move else "instruction"
-            text = (
-                fact("program_not_understood", text=what.text, place=step.place)
-                if what.stops
-                else fact("not_followed", text=what.text, reason=reason)
-            )
-            found.append(LocatedFinding("fail" if what.stops else "caution", text, step.place, step.calls))
     found += [
-        LocatedFinding("caution", fact("not_followed", text="", reason=each.kind), each.place)
-        for each in execution.endings
-        if each.kind != "end" and each.kind != "joins"
+        LocatedFinding(level_of(each), each, step.place, step.calls)
+        for step, each in chain(_not_understood(steps), doubtful_settings(execution, robot))
     ]
-    found += [
-        LocatedFinding("note", fact("not_followed", text=text, reason="unreached"), place)
-        for place, text in _unreached(execution)
-    ]
+    placed = [(each.place, fact("not_followed", text="", reason=each.kind)) for each in execution.cut]
+    placed += [(place, fact("not_followed", text=text, reason="unreached")) for place, text in unreached.items()]
     if obstacles is not None and obstacles.bodies.in_error:
-        found.append(LocatedFinding("caution", fact("pairs_unexamined", pairs=obstacles.bodies.in_error), top))
-    found += [*_loads(execution, robot), *_not_set(execution)]
-    found += [
-        LocatedFinding(level_of(each), each, step.place, step.calls) for step, each in suspect_numbers(execution, robot)
-    ]
+        placed.append((top, fact("pairs_unexamined", pairs=obstacles.bodies.in_error)))
+    found += [LocatedFinding(level_of(each), each, place) for place, each in placed]
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
         groups[each.place, each.finding.code, which(each.finding)].append(each)
     grouped = [_at_worst(same) for same in groups.values()]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
     return tuple(sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -RANKS[each.level])))
+
+
+def _not_understood(steps: Iterable[Step]) -> Iterator[tuple[Step, Finding]]:
+    """Instructions that are not followed, and those at which the controller stops."""
+    for step in steps:
+        if isinstance(what := step.instruction, Unknown):
+            reason: NotFollowedReason = "setting" if what.shapes and not what.may_move else "instruction"
+            if what.stops:
+                yield step, fact("program_not_understood", text=what.text, place=step.place)
+            else:
+                yield step, fact("not_followed", text=what.text, reason=reason)
 
 
 def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
@@ -358,57 +335,16 @@ def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
     return replace(first, finding=found, times=len(same))
 
 
-def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
-    """Loads that the program states and that exceed the arm's payload, each at the first motion with it."""
-    wrist, seen = robot.masses.wrist, set()
-    for step in execution.steps:
-        load = step.instruction.load if isinstance(step.instruction, ArmMotion) else None
-        if wrist is None or load is None or load in seen:
-            continue
-        seen.add(load)
-        if load.mass is not None and load.mass > wrist.payload:
-            yield LocatedFinding(
-                "fail", fact("load_above_payload", mass_kg=load.mass, payload_kg=wrist.payload), step.place, step.calls
-            )
-
-
-def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
-    """Tool and base that a program does not set, at the first motion that needs them."""
-    for step in execution.steps:
-        what = step.instruction
-        if not isinstance(what, ArmMotion) or not isinstance(what.target, PoseTarget):
-            continue
-        if not (what.tool.own and what.base.own):
-            kind = "tool" if what.base.own else "base" if what.tool.own else "both"
-            yield LocatedFinding("note", fact("frames_from_robot_file", kind=kind), step.place, step.calls)
-            return
-
-
-def _place_of(finding: Finding, top: Place) -> Place:
-    """The place of a finding about the text."""
-    place = getattr(finding, "place", None)
-    return place if isinstance(place, Place) else top
-
-
-def _unreached(execution: Execution) -> Iterator[tuple[Place, str]]:
-    """Motions of the program's own file that no way comes to; none where not all ways were followed."""
-    if not execution.complete:
-        return
-    met = {step.place for step in execution.steps}
-    for place, text in execution.program.motions():
-        if place not in met and place.file == execution.program.file:
-            yield place, text
-
-
 NOT_FOLLOWED = ("not_followed", "way_not_known", "configuration_guessed")
 
 
 def _verdicts(
-    program: Program,
     execution: Execution,
     motions: Mapping[int, CheckedMotion],
+    unreached: Mapping[Place, str],
     located: tuple[LocatedFinding, ...],
 ) -> tuple[MotionVerdict, ...]:
+    program = execution.program
     done: dict[Place, list[CheckedMotion]] = defaultdict(list)
     lines: dict[Place, int] = {}
     for number, motion in motions.items():
@@ -421,7 +357,6 @@ def _verdicts(
         levels[each.place].append(each.level)
         if is_one(each.finding, *NOT_FOLLOWED):
             lost.add(each.place)
-    nowhere = {place for place, _ in _unreached(execution)}
     found = []
     for place, text in program.motions():
         here = done[place]
@@ -436,7 +371,7 @@ def _verdicts(
                 lines.get(place, place.line),
                 " ".join(text.split()),
                 here[0].motion.kind if here else "",
-                worst_of((*levels[place], "pass" if followed or place in nowhere else "caution")),
+                worst_of((*levels[place], "pass" if followed or place in unreached else "caution")),
                 followed,
                 len(here),
                 max(durations, default=None),
@@ -447,10 +382,8 @@ def _verdicts(
 
 
 def _cycle(
-    execution: Execution, motions: Mapping[int, CheckedMotion], main: Ending | None, way: tuple[int, ...]
+    execution: Execution, motions: Mapping[int, CheckedMotion], part: tuple[int, ...], repeats: bool
 ) -> CycleTime:
-    again = None if main is None else execution.round_from(main)
-    part = way if again is None else way[way.index(again) :]
     stopping, saved, pauses, waits, complete = 0.0, 0.0, 0.0, 0, True
     before: CheckedMotion | None = None
     for number in part:
@@ -468,7 +401,7 @@ def _cycle(
         if before is not None and before.path is not None and before.motion.zone.kind != "fine":
             saved += before.path.law.saved_by_blend + motion.path.law.saved_by_blend
         before = motion
-    return CycleTime(stopping - saved + pauses, stopping + pauses, pauses, waits, again is not None, complete)
+    return CycleTime(stopping - saved + pauses, stopping + pauses, pauses, waits, repeats, complete)
 
 
 SAME_PLACE = 1e-6  # rad or m, by which the start of a motion may be off the end of the one before

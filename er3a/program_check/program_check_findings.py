@@ -57,6 +57,7 @@ FAILS = frozenset(
     (
         *("target_out_of_reach", "way_out_of_reach", "configuration_ends", "above_limit", "below_limit"),
         *("combination_exceeded", "too_fast", "acceleration_too_great", "load_above_payload"),
+        "program_not_understood",
     )
 )
 NOTES = frozenset(("frames_from_robot_file", "meets_singularity", "clear_of_assumed", "passes_singularity"))
@@ -64,29 +65,35 @@ WRONG = frozenset(("not_understood", "not_finite", "too_far", "too_many_joints")
 """Why a target is none: the program gives it, but not as a target of its motion or of the arm."""
 
 
-def level_of(finding: Finding) -> Level:
+IMPOSSIBLE = ("impossible_speed", "mm", "mm/s")
+"""Numbers that no arm can take, in the unit that the language has."""
+
+
+def level_of(finding: Finding, guessed: bool = False) -> Level:
     """Severity of a finding: ``fail`` where the program can't be executed as written, never on a guess.
 
     Parameters
     ----------
     finding : of any kind; a collision fails where bodies touch for certain
+    guessed : whether it rests on a start that was taken among several, so that nothing is certain
 
     Returns
     -------
     level : ``note``, ``caution`` or ``fail``; ``caution`` for all that no rule names
     """
-    match finding:
-        case Finding(code="not_followed", reason=reason):
-            return "fail" if reason in WRONG else "caution"
-        case Finding(code="speed_not_given", word=word, refused=refused):
-            return "fail" if refused else "caution" if word else "note"
-        case Finding(code="suspect_number", kind="impossible_speed" | "mm" | "mm/s"):
-            return "fail"
-        case Finding(code="motion_collides", touches=touches):
-            return "fail" if any(touch.certain for touch in touches) else "caution"
-    if finding.code in FAILS:
-        return "caution" if getattr(finding, "basis", "") == "assumed" else "fail"
-    return "note" if finding.code in NOTES else "caution"
+    params = finding.params
+    match finding.code:
+        case "not_followed":
+            fails, note = params["reason"] in WRONG, params["reason"] == "unreached"
+        case "speed_not_given":
+            fails, note = params["refused"], not params["word"]
+        case "suspect_number":
+            fails, note = params["kind"] in IMPOSSIBLE, False
+        case "motion_collides":
+            fails, note = any(touch.certain for touch in finding.touches), False
+        case code:
+            fails, note = code in FAILS and getattr(finding, "basis", "") != "assumed", code in NOTES
+    return "fail" if fails and not guessed else "note" if note and not fails else "caution"
 
 
 def gravity(finding: Finding) -> float:

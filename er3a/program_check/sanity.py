@@ -13,7 +13,7 @@ from er3a.kinematics.chain import arm_length
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import may_be_radians
 from er3a.programs.execution import Execution, Step
-from er3a.programs.instructions import MM, ArmMotion, JointTarget, NamedFrame, PoseTarget, Rate
+from er3a.programs.instructions import MM, ArmMotion, JointTarget, Load, NamedFrame, PoseTarget, Rate
 from er3a.robots.robot import Robot
 
 IN_SI = ("urscript",)
@@ -27,8 +27,8 @@ Suspect = tuple[Step, str, str, str]
 """A step, the kind of its number, the number as it is written, and what is usual or may be meant."""
 
 
-def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, Finding]]:
-    """Numbers of a program that are likely mistakes.
+def doubtful_settings(execution: Execution, robot: Robot) -> Iterator[tuple[Step, Finding]]:
+    """Loads beyond the arm's payload, frames that the program does not set, and numbers that are likely mistakes.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, 
 
     Returns
     -------
-    suspects : pairs of step and finding: targets that look like m or rad, speeds far from the others, a tool or base
-        that one motion alone has
+    found : pairs of step and finding, each load and the frames at the first motion with them; suspects are targets that
+        look like m or rad, speeds far from the others, a tool or base that one motion alone has
     """
     steps = list({step.place: step for step in execution.steps if isinstance(step.instruction, ArmMotion)}.values())
     motions = [(step, step.instruction) for step in steps if isinstance(step.instruction, ArmMotion)]
@@ -52,8 +52,32 @@ def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, 
         _speeds(motions, robot),
         *(_used_once(which, used) for which, used in frames),
     )
+    yield from _loads(execution, robot)
+    yield from _not_set(execution)
     for step, kind, text, usual in suspects:
         yield step, fact("suspect_number", kind=kind, text=text, usual=usual)
+
+
+def _loads(execution: Execution, robot: Robot) -> Iterator[tuple[Step, Finding]]:
+    wrist = robot.masses.wrist
+    first: dict[Load, Step] = {}
+    for step in execution.steps:
+        if isinstance(what := step.instruction, ArmMotion) and what.load is not None:
+            first.setdefault(what.load, step)
+    for load, step in first.items():
+        if wrist is not None and load.mass is not None and load.mass > wrist.payload:
+            yield step, fact("load_above_payload", mass_kg=load.mass, payload_kg=wrist.payload)
+
+
+def _not_set(execution: Execution) -> Iterator[tuple[Step, Finding]]:
+    for step in execution.steps:
+        what = step.instruction
+        if not isinstance(what, ArmMotion) or not isinstance(what.target, PoseTarget):
+            continue
+        if not (what.tool.own and what.base.own):
+            kind = "tool" if what.base.own else "base" if what.tool.own else "both"
+            yield step, fact("frames_from_robot_file", kind=kind)
+            return
 
 
 def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: bool) -> Iterator[Suspect]:

@@ -13,7 +13,8 @@ References
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Hashable, Iterable
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,7 +48,7 @@ from er3a.program_check.motion_checks import (
     path_findings,
     tool_path,
 )
-from er3a.program_check.program_check_findings import Level
+from er3a.programs.execution import Execution
 from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget, Target, UnresolvedTarget, Zone
 from er3a.programs.solving import rows_meant, solutions_meant
 from er3a.robots.joint_limits import equivalents_within
@@ -110,25 +111,6 @@ class CheckedMotion(ByValue):
         """
         for each, moment in found.items():
             self.findings.setdefault(each, moment)
-
-    def level_of(self, finding: Finding) -> Level:
-        """How severe one of the motion's findings is.
-
-        Parameters
-        ----------
-        finding : one of :attr:`findings`
-
-        Returns
-        -------
-        level : as :func:`level_of` says, but a caution in place of a fail where the start was guessed
-        """
-        level = found_in.level_of(finding)
-        return "caution" if self.guessed and level == "fail" else level
-
-    @property
-    def level(self) -> Level:
-        """The worst of its findings."""
-        return found_in.worst_of(map(self.level_of, self.findings))
 
 
 class Judge:
@@ -317,8 +299,8 @@ def _configuration(target: Target) -> str:
 class Obstacles:
     """The bodies that an arm must not touch, itself among it.
 
-    What is carried hangs at the flange, where the robot's own tool puts it, or if it has none the one of ``tools``
-    (4, 4), the first of them that is no bare flange: it stays there whatever tool a motion names.
+    What is carried hangs at the flange, where the robot's own tool puts it, or if it has none the one of ``motions``,
+    the first of them that is no bare flange: it stays there whatever tool a motion names.
 
     Parameters
     ----------
@@ -327,20 +309,27 @@ class Obstacles:
     """
 
     def __init__(
-        self, robot: Robot, scene: Scene | None, tools: Iterable[Reals], tolerance: float, assumed_margin: float
+        self,
+        robot: Robot,
+        scene: Scene | None,
+        motions: Mapping[int, CheckedMotion],
+        tolerance: float,
+        assumed_margin: float,
     ):
+        self.motions = motions
         bare = np.array_equal(robot.tool, np.eye(4))
+        tools = [each.motion.tool.pose for each in motions.values() if each.motion.tool.pose is not None]
         carrier = next((each for each in tools if bare and not np.array_equal(each, np.eye(4))), robot.tool)
         self.robot = robot if scene is None or not scene.carried else robot.replace(tool=carrier)
         self.scene, self.bodies, self.tolerance = scene, Bodies(self.robot, scene), tolerance
         self.assumed_margin = assumed_margin if arm_shapes(robot).assumed else 0.0
 
-    def check(self, motions: list[CheckedMotion], keep_on: Callable[[], bool]) -> None:
-        """Measure the clearance of motions, and find what touches on them; both are added to the motions.
+    def check(self, execution: Execution, keep_on: Callable[[], bool]) -> None:
+        """Measure the clearance of motions and corners, and find what touches; both are added to the motions.
 
         Parameters
         ----------
-        motions : of one arm; those without a way are passed over
+        execution : that the motions are of; those without a way are passed over
         keep_on : asked before each round; once it is False, motions with open parts get :class:`ClearanceNotProven`
 
         Notes
@@ -348,9 +337,14 @@ class Obstacles:
         Parts of a way are halved until the bound of [1]_ shows them clear or touching, or bodies move by less than the
         tolerance.
         """
-        paths = [(each, each.path) for each in motions if each.path is not None and len(each.path.q)]
-        if not paths or not self.bodies.pairs:
-            return
+        once = {id(each): each for each in self.motions.values()}.values()
+        paths = [(each, each.path) for each in once if each.path is not None and len(each.path.q)]
+        if paths and self.bodies.pairs:
+            self._measure(paths, keep_on)
+        for one, other in self._corners(execution):
+            self._corner(one, other)
+
+    def _measure(self, paths: list[tuple[CheckedMotion, MotionPath]], keep_on: Callable[[], bool]) -> None:
         q = np.concatenate([path.q for _, path in paths])
         share = np.concatenate([path.share for _, path in paths])
         owner = np.repeat(np.arange(len(paths)), [len(path.q) for _, path in paths])
@@ -442,7 +436,25 @@ class Obstacles:
         hit = fact("motion_collides", touches=(), assumed=assumed)
         return {found_in.with_touches_of(hit, [hit.but(touches=tuple(touches))]): float(path.law.times(first))}
 
-    def corner(self, one: CheckedMotion, other: CheckedMotion) -> None:
+    def _corners(self, execution: Execution) -> Iterator[tuple[CheckedMotion, CheckedMotion]]:
+        """Motions that follow each other, each pair once."""
+        joins: dict[int, list[int]] = defaultdict(list)  # by step, the last ones of ways that go on with it
+        for ending in execution.endings:
+            if ending.repeats_from is not None:
+                joins[ending.repeats_from].append(ending.step)
+        last: dict[int, set[int]] = {-1: set()}  # by step, the motions that may be the last up to it
+        pairs: dict[tuple[int, int], tuple[CheckedMotion, CheckedMotion]] = {}
+        for _ in range(2):  # the second time with what joins from further on
+            for number, step in enumerate(execution.steps):
+                before = set().union(*(last.get(each, ()) for each in (step.before, *joins[number])))
+                if number not in self.motions:
+                    last[number] = before
+                    continue
+                last[number], other = {number}, self.motions[number]
+                pairs |= {(id(one), id(other)): (one, other) for one in map(self.motions.__getitem__, sorted(before))}
+        yield from pairs.values()
+
+    def _corner(self, one: CheckedMotion, other: CheckedMotion) -> None:
         """Find what the corner between two motions touches that a zone rounds; what is found is added to the first.
 
         Parameters

@@ -108,7 +108,19 @@ class Execution(ByValue):
     @property
     def complete(self) -> bool:
         """Whether every way was followed to its end, or until it repeats."""
-        return all(each.kind in ("end", "joins") for each in self.endings)
+        return not self.cut
+
+    @property
+    def cut(self) -> tuple[Ending, ...]:
+        """Ends of ways that were not followed on."""
+        return tuple(each for each in self.endings if each.kind not in ("end", "joins"))
+
+    @property
+    def unreached(self) -> dict[Place, str]:
+        """Motions of the program's own file that no way comes to, with their text; none where ways were cut."""
+        met, program = {step.place for step in self.steps}, self.program
+        found = program.motions() if self.complete else ()
+        return {place: text for place, text in found if place not in met and place.file == program.file}
 
     @property
     def motions(self) -> tuple[int, ...]:

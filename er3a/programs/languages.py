@@ -1,25 +1,33 @@
 """Programs read and written in the languages that are registered here: one record for each language.
 
 :func:`read_program` detects a file's language and reads it; :func:`write_program` writes a sequence;
-:func:`er3a.programs.machine.execute` runs what was read, by the language's dialect.
+:func:`execute` runs what was read, by the language's dialect.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
-from er3a.errors import InputError
+import numpy as np
+
+from er3a.errors import InputError, ShapeError
 from er3a.finding import fact, is_one
-from er3a.programs.evaluation import MAX_ROBOT_AXES, Dialect
+from er3a.geometry.transforms import check_poses
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
+from er3a.programs.evaluation import MAX_ROBOT_AXES, Cell, Dialect
+from er3a.programs.execution import Execution, Mover, RunLimits
 from er3a.programs.instructions import JointTarget, Listing
 from er3a.programs.krl.dialect import KrlDialect
 from er3a.programs.krl.reader import companions as krl_files
 from er3a.programs.krl.reader import read_krl
 from er3a.programs.krl.writer import KrlWriter
 from er3a.programs.lexing import ProgramText, read_program_text
+from er3a.programs.machine import Machine
 from er3a.programs.program_names import LanguageName
 from er3a.programs.rapid.dialect import RapidDialect
 from er3a.programs.rapid.reader import SUFFIXES as RAPID_SUFFIXES
@@ -169,6 +177,43 @@ def files_of(path: Path) -> tuple[Path, ...]:
         return (path, *LANGUAGES[language_of(read_program_text(path))].companions(path))
     except InputError:
         return (path,)
+
+
+def execute(
+    program: Program,
+    robot: Robot | None = None,
+    start: Reals | None = None,
+    frames: Mapping[str, Reals] | None = None,
+    limits: RunLimits | None = None,
+    mover: Mover | None = None,
+) -> Execution:
+    """Execute a program symbolically: its instructions in order, on every path through it.
+
+    Parameters
+    ----------
+    robot : the arm, needed for partial and relative targets
+    start : (n,), rad or m, joint values at the start of the program
+    frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
+    mover : as of :class:`Machine`
+
+    Raises
+    ------
+    InputError
+        for an arm with another number of joints than the program's language or table supports
+    ShapeError, PoseError
+        for a start without one value for each joint, and a frame that is not a rigid transform
+    """
+    known = {name: check_poses(pose, name) for name, pose in (frames or {}).items()}
+    cell = Cell(None, start, frames=known)
+    if robot is not None:
+        if reason := not_written(program.language, robot):
+            raise InputError(program.file, None, reason, "Give the arm that the program is meant for")
+        if start is not None and np.shape(start) != robot.lower.shape:
+            raise ShapeError("start", np.shape(start), f"({len(robot.lower)},)")
+        bare = robot.without_tool().replace(base=np.eye(4))
+        cell = Cell(partial(forward, bare), start, robot.joints, known, robot.tool, np.eye(4))
+    dialect = LANGUAGES[program.language].dialect()
+    return Machine(program, dialect, cell, limits or RunLimits(), mover).run()
 
 
 def write_program(listing: Listing, language: LanguageName, options: WriteOptions | None = None) -> WrittenProgram:

@@ -9,21 +9,14 @@ out beyond a limit is no part of what was followed (``Execution.complete``).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 
-import numpy as np
-
-from er3a.errors import InputError, ShapeError
-from er3a.geometry.transforms import check_poses
-from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Reals
 from er3a.programs import syntax
 from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, root, variable_of
 from er3a.programs.execution import Ending, EndKind, Execution, Mover, RunLimits, Step
 from er3a.programs.instructions import ArmMotion, Aside, Decision, Instruction, Output, Pause, Place, Unknown
-from er3a.programs.languages import LANGUAGES, not_written
 from er3a.programs.syntax import (
     Assign,
     Branch,
@@ -42,9 +35,9 @@ from er3a.programs.syntax import (
     Variable,
     Waiting,
 )
-from er3a.robots.robot import Robot
 
 IN_ONE_PLACE = 8  # ways, before what differs between them becomes unknown
+NEARLY_OVER = 0.1  # of the operations: from there on one way goes on in each place, so that all end
 STATE_COST = 10  # operations, as many as which the comparison of a state with others counts
 OTHERWISE = "%otherwise"  # what makes motions go otherwise, and is not followed
 UNKNOWN_ROUNDS = 12  # of a loop that only something unknown ends, before what it changes becomes unknown
@@ -209,11 +202,12 @@ class Machine:
 
     def _joined(self, ways: list[Way]) -> list[Way]:
         """Ways in one place, those in one state as one; of too many one in which what differs is unknown: first for
-        each position of the arm, then for all."""
+        each position of the arm, then for all. Rather than to cut ways, few operations leave one in each place."""
+        most = IN_ONE_PLACE if self.budget > NEARLY_OVER * self.limits.operations else 1
         kept = self._one_of_each(ways, self._state) if len(ways) > 1 else ways
-        if len(kept) > IN_ONE_PLACE:
+        if len(kept) > most:
             kept = self._one_of_each(kept, lambda way: way.memory.here.key())
-        return self._one_of_each(kept, lambda way: 0) if len(kept) > IN_ONE_PLACE else kept
+        return self._one_of_each(kept, lambda way: 0) if len(kept) > most else kept
 
     def _one_of_each(self, ways: list[Way], key: Callable[[Way], Hashable]) -> list[Way]:
         kept: dict[Hashable, Way] = {}
@@ -406,6 +400,8 @@ class Machine:
             self._round(other, at)
         if self._waiting() + 1 >= self.limits.ways:
             self.pending = {where: self._joined(here) for where, here in self.pending.items()}
+        if self._waiting() + 1 >= self.limits.ways:  # then one way in each place, for all that come to it
+            self.pending = {where: self._one_of_each(here, lambda way: 0) for where, here in self.pending.items()}
         if self._waiting() + 1 < self.limits.ways:
             self._wait(other)
         else:
@@ -505,47 +501,3 @@ def _pause(memory: ProgramMemory, waiting: Waiting) -> Pause:
     if seconds is not None and seconds >= 0:
         return Pause(seconds)
     return Pause(condition=waiting.text)
-
-
-def execute(
-    program: Program,
-    robot: Robot | None = None,
-    start: Reals | None = None,
-    frames: Mapping[str, Reals] | None = None,
-    limits: RunLimits | None = None,
-    mover: Mover | None = None,
-) -> Execution:
-    """Execute a program symbolically: its instructions in order, on every path through it.
-
-    Parameters
-    ----------
-    robot : the arm, needed for partial and relative targets
-    start : (n,), rad or m, joint values at the start of the program
-    frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
-    mover : as of :class:`Machine`
-
-    Raises
-    ------
-    InputError
-        for an arm with another number of joints than the program's language or table supports
-    ShapeError, PoseError
-        for a start without one value for each joint, and a frame that is not a rigid transform
-    """
-    if robot is not None and (reason := not_written(program.language, robot)):
-        raise InputError(program.file, None, reason, "Give the arm that the program is meant for")
-    if robot is not None and start is not None and np.shape(start) != robot.lower.shape:
-        raise ShapeError("start", np.shape(start), f"({len(robot.lower)},)")
-    flange = None
-    if robot is not None:
-        bare = robot.without_tool().replace(base=np.eye(4))
-
-        def flange(joints: Reals) -> Reals:
-            """T_robot_flange (..., 4, 4), m, of joints (..., n), rad or m."""
-            return forward(bare, joints)
-
-    known = {name: check_poses(pose, name) for name, pose in (frames or {}).items()}
-    cell = Cell(flange, start, frames=known)
-    if robot is not None:
-        cell = replace(cell, joints=robot.joints, tool=robot.tool, base=np.eye(4))
-    dialect = LANGUAGES[program.language].dialect()
-    return Machine(program, dialect, cell, limits or RunLimits(), mover).run()

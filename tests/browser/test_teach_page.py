@@ -34,8 +34,7 @@ from er3a.pipeline.teach import panel as teach_page
 from er3a.pipeline.teach.panel import WORDS
 from er3a.pipeline.viewing.still import FLAT
 from er3a.planning.commands import CommandSource
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program
 from er3a.programs.solving import Resolver
 from er3a.robots.joint_limits import meant
 from testing.arms import five_axis, gantry, make_arm, palletiser, pose_errors, scara

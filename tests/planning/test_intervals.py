@@ -19,6 +19,7 @@ from er3a.planning.motion_faults import (
     unreachable,
 )
 from er3a.planning.moves import JointMove, line
+from er3a.planning.names import in_order
 from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.sequences import arc
 from er3a.planning.timing import joint_limits
@@ -127,3 +128,13 @@ def test_a_limit_of_a_sum_is_proven_along_a_line_of_the_tool():
     ends = [end for end in (found.start, found.end) if 0 < end < 2]
     assert ends
     np.testing.assert_allclose(np.degrees(followed.joints(np.array(ends))[:, 1:3].sum(axis=1)), top, atol=1e-6)
+
+
+def test_what_is_too_fast_only_towards_the_edge_of_the_reach_comes_last():
+    """Of a path of 4 s that leaves the reach at 3 s; a stretch that is too fast before counts by itself."""
+    spans = {"unreachable": [(3.0, 4.0)], "too fast": [(2.9, 3.0)], "collides": [(3.5, 3.6)]}
+    found = [(each.kind, each.follows) for each in in_order(spans, 4.0)]
+    assert found == [("unreachable", False), ("collides", False), ("too fast", True)]
+    first = in_order(spans | {"too fast": [(2.9, 3.0), (1.0, 1.2)]}, 4.0)[0]
+    assert (first.kind, first.start, first.parts) == ("too fast", 1.0, [1])
+    assert in_order({"too fast": [(1.0, 3.0)], "unreachable": [(3.0, 4.0)]}, 4.0)[0].kind == "too fast"  # too long

@@ -18,8 +18,7 @@ from er3a.pipeline import (
 from er3a.pipeline.commands.options import app
 from er3a.pipeline.path_programs import PathProgram
 from er3a.pipeline.scope import Open
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program
 
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = "data/programs/faults"

@@ -12,8 +12,7 @@ from er3a.files.robot_library import load_robot
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import ArmMotion, JointTarget
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program
 
 ROBOT = load_robot("er3a_c60")
 START = np.radians([0, -20, 10, 0, 30, 0])
@@ -216,3 +215,14 @@ def test_each_run_of_a_random_program_does_what_was_followed(seed, tmp_path):
         for line, angle in done:
             here = line + head.count("\n")
             assert here in unknown or (here, angle) in followed
+
+
+def test_ways_of_too_many_sides_are_joined_and_not_cut(tmp_path):
+    """What differs between them is unknown then: a motion by it is not followed, and one without it passes."""
+    sides = "".join(f"IF $IN[{number}] THEN\nM={number}\n" for number in range(1, 6)) + "ENDIF\n" * 5
+    check = checked(tmp_path, krl(f"M=0\n{sides}{AXES}\nPTP {{A1 M}}"), limits=RunLimits(ways=3))
+    assert check.execution.complete
+    assert [(each.level in ("pass", "note"), each.followed) for each in check.verdicts] == [
+        (True, True),
+        (False, False),
+    ]

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import transform
 from er3a.programs.instructions import Convention, numbers_of, pose_of
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program
 
 robomath = pytest.importorskip("robodk.robomath")
 CONVENTIONS: tuple[Convention, ...] = ("kuka", "efort", "ur", "abb")

@@ -10,8 +10,7 @@ from er3a.errors import InputError
 from er3a.finding import fact
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import ArmMotion, Remark, Unknown, UnresolvedTarget
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program
 from tests.programs.test_examples import EXAMPLES
 from tests.programs.test_other_readers import XPL
 

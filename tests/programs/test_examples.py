@@ -10,8 +10,7 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.finding import fact
 from er3a.kinematics.forward import forward
-from er3a.programs.languages import read_program, write_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program, write_program
 from er3a.programs.solving import Resolver
 from er3a.programs.writing import WriteOptions
 

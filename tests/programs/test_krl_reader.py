@@ -9,8 +9,7 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.programs.instructions import Aside, Decision, JointTarget, Output, Pause, PoseTarget, Unknown
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program
 
 DATA = """&ACCESS RVP
 DEFDAT weld PUBLIC

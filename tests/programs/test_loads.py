@@ -9,8 +9,7 @@ from er3a.files.robot_library import load_robot
 from er3a.finding import fact, is_one
 from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Load, NamedFrame, UnclearLoad, Unknown
-from er3a.programs.languages import read_program, write_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program, write_program
 from er3a.programs.writing import WriteOptions, WrittenProgram
 from er3a.robots.masses import MassBody
 

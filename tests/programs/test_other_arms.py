@@ -15,8 +15,7 @@ from er3a.pipeline.commands.options import app
 from er3a.planning.commands import JointSequenceCommand
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.from_commands import listing_of
-from er3a.programs.languages import read_program, write_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program, write_program
 from er3a.programs.writing import WriteOptions
 from er3a.robots.robot import Robot
 

@@ -20,8 +20,7 @@ from er3a.programs.instructions import (
     Unknown,
     UnresolvedTarget,
 )
-from er3a.programs.languages import read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program
 from er3a.robots.robot import Robot
 
 XPL = """<?xml version="1.0" encoding="utf-8"?>

@@ -27,8 +27,7 @@ from er3a.programs.instructions import (
     UnresolvedTarget,
     Zone,
 )
-from er3a.programs.languages import files_of, read_program, write_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, files_of, read_program, write_program
 from er3a.programs.rapid.data_types import branch_of
 from er3a.programs.rapid.reader import MOTIONS
 from er3a.programs.solving import solutions_meant

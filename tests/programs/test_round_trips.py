@@ -23,8 +23,7 @@ from er3a.planning.commands import (
 from er3a.planning.profiles import Times
 from er3a.programs.from_commands import listing_of
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Output, Pause, PoseTarget, Rate, Remark, Zone
-from er3a.programs.languages import read_program, write_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program, write_program
 from er3a.programs.writing import HEAD, WriteOptions, with_head_lines
 
 LANGUAGES = ("krl", "urscript", "rpl", "xpl", "rapid")

@@ -15,8 +15,7 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import ArmMotion, Aside, Output, Pause, Remark, Unknown
-from er3a.programs.languages import files_of, read_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, files_of, read_program
 
 STYLES = Path(__file__).with_name("styles")
 ROBOT = load_robot("er3a_c60")

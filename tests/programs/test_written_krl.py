@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Pause
-from er3a.programs.languages import read_program, write_program
-from er3a.programs.machine import execute
+from er3a.programs.languages import execute, read_program, write_program
 from er3a.programs.writing import WriteOptions
 from tests.programs.test_round_trips import ROBOT, listing_of, tool_path
 

@@ -15,7 +15,7 @@ from er3a.pipeline.messages.planning import STRATEGIES
 from er3a.pipeline.messages.say import joined, listed, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import rate_ratio
-from er3a.planning.names import StrategyName
+from er3a.planning.names import FAULTS, FirstFault, PathVerdict, StrategyName, in_order
 
 KEY_FIGURES = words(
     {
@@ -175,27 +175,38 @@ class FaultText(NamedTuple):
 
 
 def first_faults(path: model.PathSummary) -> list[FaultText]:
-    """What is wrong first with a path, and where it leaves reach or limits or collides, or else its gravest fault: in
-    order of time, what only follows from others last. What is undecided counts only where it comes before all that is
-    not."""
-    fast = [[part for part in path.too_fast if part.cause.basis == each] for each in ("documented", "assumed")]
-    grave: list[Sequence[model.Stretch]] = [path.unreachable, path.out_of_limits, path.collisions]
-    firsts = [min(each, key=lambda part: part.t0_s) for each in grave if each]
-    found = [FaultText(part.t0_s, _with_worst(part, say_first(part.cause)), part.t0_s) for part in firsts]
-    edge = _edge(path)
-    for each in filter(None, fast):
-        run, _ = _run(each)
-        seen, end = _worst_of_kinds(run)[0].worst_s, _end_of(run)
-        follows = end >= edge - ADJOINING
-        found.append(FaultText(run[0].t0_s, _rates(each, edge), run[0].t0_s if seen is None else seen, follows))
-    events = [] if path.in_joint_space else [e for e in path.singularities if e.crossing and e.t_s < edge - AT_EDGE]
-    found += [FaultText(e.t_s, _kind(e), e.t_s) for e in events[:1]]
-    found += [FaultText(jump.t_s, say(jump), jump.t_s) for jump in path.jumps[:1]]
-    open_ = min(path.undecided, key=lambda part: part.t0_s, default=None)
-    if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
-        found.append(FaultText(open_.t0_s, cause_text(open_), open_.t0_s))
-    chosen = {*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]}
-    return sorted(chosen, key=lambda each: (each.follows, each))
+    """What makes a path fail, and what is wrong first: where each begins, in the library's order
+    (:func:`er3a.planning.names.in_order`)."""
+    fast: dict[PathVerdict, list[model.Stretch]] = {"too fast": [], "too fast for the assumed limits": []}
+    for part in path.too_fast:
+        fast["too fast" if part.cause.basis == "documented" else "too fast for the assumed limits"].append(part)
+    stretches: dict[PathVerdict, Sequence[model.Stretch]] = {
+        "unreachable": path.unreachable,
+        "leaves limits": path.out_of_limits,
+        "collides": path.collisions,
+        **fast,
+        "undecided": path.undecided,
+    }
+    spans = {kind: [(part.t0_s, part.t1_s) for part in parts] for kind, parts in stretches.items()}
+    found = in_order(spans | {"singular": [(event.t_s, event.t_s) for event in path.singular]}, path.duration_s)
+    first = min(found, key=lambda each: each.start, default=None)
+    shown = [each for each in found if each is first or (each.kind in FAULTS and not each.follows)]
+    return [
+        _said(path, each, [stretches[each.kind][i] for i in each.parts if each.kind in stretches]) for each in shown
+    ]
+
+
+def _said(path: model.PathSummary, fault: FirstFault, parts: list[model.Stretch]) -> FaultText:
+    seen = fault.start
+    if fault.kind == "singular":
+        event = path.singular[fault.parts[0]]
+        text = _kind(event) if isinstance(event, model.Singularity) else say(event)
+    elif fault.kind.startswith("too fast"):
+        text, worst = _rates(parts, fault.follows), _worst_of_kinds(_run(parts)[0])[0].worst_s
+        seen = seen if worst is None else worst
+    else:
+        text = _with_worst(parts[0], say_first(parts[0].cause))
+    return FaultText(fault.start, text, seen, fault.follows)
 
 
 def _edge(path: model.PathSummary) -> float:
@@ -244,15 +255,15 @@ def _worst_of_kinds(run: Sequence[model.Stretch]) -> list[model.Stretch]:
     return [max(alike, key=lambda part: rate_ratio(part.cause)) for alike in kinds.values()]
 
 
-def _rates(stretches: Sequence[model.Stretch], edge: float = math.inf) -> str:
+def _rates(stretches: Sequence[model.Stretch], at_edge: bool = False) -> str:
     """What is too fast first, of all joints: stretches that adjoin are one, and each kind of limit has its worst.
 
-    ``edge``: when (s) the path leaves the reach; towards it speeds have no bound.
+    ``at_edge``: whether it follows from leaving the reach; towards its edge speeds have no bound.
     """
     run, again = _run(stretches)
     first, end = run[0], _end_of(run)
     named = [f"J{joint}" for joint in sorted({part.cause.joint for part in run})]
-    if end >= edge - ADJOINING:
+    if at_edge:
         return sentence("path.rates_at_edge", named=named)
     if len(run) == 1 and not _lasts(first):
         return say(first.cause)

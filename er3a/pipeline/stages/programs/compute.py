@@ -59,6 +59,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     lines: list[model.Lines] = []
     instructions: list[model.Instructions] = []
     unknown_starts: list[str] = []
+    asked: list[model.ProgramSummary] = []  # those that are given to be run
     arms: list[tuple[str, Robot]] = []
     motions: list[model.ProgramMotion] = []
     for entry in listed.programs:
@@ -67,24 +68,24 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
         summaries.append(_summary(entry, check, starts))
         if any(is_one(each.finding, "way_not_known") for each in check.findings):
             unknown_starts.append(entry.name)
-        arms += check.arms if entry.expect in (None, "pass") else ()
+        if entry.expect in (None, "pass"):
+            asked.append(summaries[-1])
+            arms += check.arms
         lines.append(_lines(entry.name, check))
         instructions.append(_instructions(entry.name, check))
         motions.append(motion)
     smallest = {
-        each.name: None if each.least_clearance_mm is None else each.least_clearance_mm / 1000
-        for each in summaries
-        if each.expect in (None, "pass")
+        each.name: None if each.least_clearance_mm is None else each.least_clearance_mm / 1000 for each in asked
     }
     assumed = shapes_assumed(robot, options.assumed_margin, smallest)
     covered = covered_collisions(robot, bodies_of(robot, scene), scene, arms)
     return model.ProgramsResults(
         summary=model.ProgramsSummary(
-            verdict=_verdict(summaries).with_assumed_shapes(assumed),
-            figures=_figures(summaries),
+            verdict=_verdict(summaries, asked).with_assumed_shapes(assumed),
+            figures=_figures(asked),
             scene=scene.title if scene else None,
             programs=tuple(summaries),
-            checked=_checked(summaries, covered),
+            checked=_checked(asked, covered),
             assumed=(
                 *assumed_rates(speeds_given(robot), not limits.acceleration_assumed),
                 *_assumed(summaries, unknown_starts),
@@ -97,9 +98,8 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     )
 
 
-def _checked(programs: Sequence[model.ProgramSummary], seen: Covered) -> tuple[Coverage, ...]:
+def _checked(asked: Sequence[model.ProgramSummary], seen: Covered) -> tuple[Coverage, ...]:
     """What the checks cover of the programs that are given to be run; of each motion all or nothing."""
-    asked = [each for each in programs if each.expect in (None, "pass")]
     lines = tuple(f"{each.name}: {', '.join(map(str, each.not_examined))}" for each in asked if each.not_examined)
     of = sum(each.motions for each in asked)
     done = max(of - sum(len(each.not_examined) for each in asked), 0)
@@ -219,14 +219,11 @@ def _motion(name: str, check: ProgramCheck, robot: Robot) -> tuple[model.Program
     return kept, starts
 
 
-def _verdict(
-    programs: list[model.ProgramSummary],
-) -> Verdict:
+def _verdict(programs: list[model.ProgramSummary], asked: list[model.ProgramSummary]) -> Verdict:
     if not programs:
         return Verdict("no_reference", fact("programs.none"))
     if unmet := unmet_expectations(programs, "pass"):
         return Verdict("fail", unmet)
-    asked = [each for each in programs if each.expect in (None, "pass")]
     caution, failed = (tuple(each.name for each in asked if each.outcome == outcome) for outcome in ("caution", "fail"))
     code = "programs.fail" if failed else "programs.caution" if caution else "programs.pass"
     status: Status = "fail" if failed else "caution" if caution else pass_of(asked)
@@ -245,8 +242,7 @@ def _verdict(
     return Verdict(status, found)
 
 
-def _figures(programs: list[model.ProgramSummary]) -> tuple[Figure, ...]:
-    asked = [each for each in programs if each.expect in (None, "pass")]
+def _figures(asked: list[model.ProgramSummary]) -> tuple[Figure, ...]:
     instructions = sum(each.motions for each in asked)
     clear = [each.least_clearance_mm for each in asked if each.least_clearance_mm is not None]
     return (

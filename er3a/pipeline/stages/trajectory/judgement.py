@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.motion import Motion, MotionTask
 from er3a.planning import motion_faults
-from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict, gravest
+from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict, gravest, in_order
 from er3a.planning.tool_curve import open_stretches
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -29,11 +29,6 @@ LIMIT_MARGIN = 2.0  # deg (mm of a prismatic joint), between an advised end and 
 REACH_MARGIN = 0.02  # m of the path before it leaves the reach
 SPEED_MARGIN = 0.9  # of a joint's speed limit; these four are chosen, no standard states them
 STOPS = 2.0  # times the time that the joints take to stop, left before the first fault
-
-
-AT_EDGE, AROUND_EDGE = 0.001, 0.1
-"""Shares of a path's duration: how near to the edge of the reach counts as at it, and how long before or after it
-joints may be too fast because of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,10 +113,13 @@ def judged(task: MotionTask, motion: Motion, along: ClearanceAlong | None = None
     }
     there = [name for name, found in faults.items() if found]
     verdict = gravest(there)
+    if motion.not_planned:  # then the straight move is shown
+        spans = {"collides": spans["collides"]}
+    firsts = in_order({verdict: [(0.0, 0.0)], **spans}, float(motion.built.duration))
     return Judgement(
         verdict=verdict,
         of_joints=gravest(name for name in there if name != "collides"),
-        outcomes=in_order(verdict, spans, float(motion.built.duration)),
+        outcomes=tuple(each.kind for each in firsts if not each.follows),
         events=events,
         limits=limits,
         fast=fast,
@@ -134,38 +132,6 @@ def judged(task: MotionTask, motion: Motion, along: ClearanceAlong | None = None
         velocity=velocity,
         acceleration=acceleration,
         speed_bounded=bounded,
-    )
-
-
-def in_order(
-    verdict: PathVerdict, spans: Mapping[PathVerdict, Sequence[tuple[float, float]]], duration: float
-) -> tuple[PathVerdict, ...]:
-    """A path's verdict and whatever else makes it a fail by itself, the first fault first.
-
-    Where a path leaves the reach it is too fast at any pace, so that follows from being unreachable. Where no motion
-    was planned, only collisions of the straight move are told.
-
-    Parameters
-    ----------
-    spans : from when to when (s) it has each fault: ``unreachable``, and what can stand beside a verdict
-    duration : s, of the whole path
-    """
-    edges = [edge for span in spans["unreachable"] for edge in span]
-    besides: dict[PathVerdict, list[float]] = {name: [start for start, _ in found] for name, found in spans.items()}
-    besides["too fast"] = [span[0] for span in spans["too fast"] if not _by_the_edge(span, edges, duration)]
-    if verdict == "none found":
-        besides = {"collides": besides["collides"]}
-    starts = {name: min(found) for name, found in besides.items() if found}
-    starts.setdefault(verdict, 0.0)
-    return tuple(sorted((verdict, *(name for name in starts if name != verdict)), key=starts.__getitem__))
-
-
-def _by_the_edge(span: tuple[float, float], edges: Iterable[float], duration: float) -> bool:
-    """Whether a stretch of time (s) runs up to the edge of the reach, or begins there, and is short."""
-    start, end = span
-    at, around = AT_EDGE * duration, AROUND_EDGE * duration
-    return any(
-        start <= edge + at and end >= edge - at and start >= edge - around and end <= edge + around for edge in edges
     )
 
 
@@ -339,7 +305,7 @@ def advised_end(path: model.PathSummary, rows: model.PathChecks, limits: model.L
     if path.not_planned or (path.collisions and until is None):
         return None
     faults = path.unreachable, path.out_of_limits, path.too_fast, path.undecided
-    starts = [part.t0_s for stretches in faults for part in stretches] + path.singular_times_s
+    starts = [part.t0_s for stretches in faults for part in stretches] + [event.t_s for event in path.singular]
     starts += [] if path.in_joint_space else rows.t_s[rows.near_singular][:1].tolist()
     first = min(starts, default=np.inf)
     stop = (np.abs(rows.q_deg_s) / limits.acceleration_deg_s2).max(axis=1)

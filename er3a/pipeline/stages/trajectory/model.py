@@ -257,10 +257,10 @@ class PathSummary:
     times_in: TimesIn = "path_file"
 
     @property
-    def singular_times_s(self) -> list[float]:
-        """When a path of the tool crosses singular poses, or the arm jumps, s after its start."""
-        crossed = [] if self.in_joint_space else [event.t_s for event in self.singularities if event.crossing]
-        return [*crossed, *(jump.t_s for jump in self.jumps)]
+    def singular(self) -> list[Singularity | Jump]:
+        """Where a path of the tool crosses singular poses, or the arm jumps."""
+        crossed = [] if self.in_joint_space else [event for event in self.singularities if event.crossing]
+        return [*crossed, *self.jumps]
 
     @property
     def outcome(self) -> PathVerdict:
