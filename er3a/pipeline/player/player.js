@@ -23,7 +23,7 @@ const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, nowShown] = ["arm", "motion", "time", "clock", "now-shown"].map(part);
-const unjudged = document.querySelector(".answer .no_verdict") && { events: [], marks: [], ...(data.others.length ? {} : { text: words.not_judged }) }; // of a wrong table
+const unjudged = document.querySelector(".answer .no_verdict") && { events: [], ...(data.others.length ? {} : { marks: [], text: words.not_judged }) }; // of a wrong table
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const floor = data.floor ?? column(table.base, 3)[2];
 
@@ -119,7 +119,7 @@ function draw() {
   space.begin();
   space.floor(column(table.base, 3), data.size / 10, floor);
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
-  arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value));
+  arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value, k === 0 && Boolean(wrong)));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
   const numbered = others.map((own, k) => sticks(own, data.solutions[k], poses[0]));
   const keys = numbered.map((at) => at.map((value) => value.toFixed(2)).join());
@@ -132,8 +132,9 @@ function draw() {
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
-    const way = motion.trails[0].filter((_, i) => motion.times[i] >= from - ROUNDED && motion.times[i] <= until + ROUNDED);
-    if (status !== "plain" && way.length > 1) space.line(way, data.colours[status], 5);
+    if (status === "plain" || from === until) continue;
+    const times = [from, ...motion.times.filter((time) => time > from && time < until), until];
+    space.line(times.map((time) => column(posesOf(arms[0], valuesAt(motion.times, motion.values[0], time)).at(-1), 3)), data.colours[status], 5);
   }
   for (const T of poses.map((own) => own.at(-1))) {
     const origin = column(T, 3);
@@ -146,9 +147,9 @@ function draw() {
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
   space.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) {
-    const css = touching.size ? page.touching : page.ink;
+    const css = touching.size || wrong ? page.touching : page.ink;
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
-    else space.line([from, to], ...(text ? [page.ink, 3] : [data.colours.sight, 1.5, false]));
+    else space.line([from, to], ...(text ? [css, 4] : [data.colours.sight, 1.5, false]));
     if (text) space.word(text, scaled(add(from, to), 0.5), css);
   }
   if (motion.loads) tellLoads(poses[0]);
@@ -156,7 +157,7 @@ function draw() {
     if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
   }
   if (arms.length === 1) nameEnds(motion.trails[0]);
-  for (const { text, at } of data.signs) space.word(text, at);
+  data.signs.forEach(({ text, at }, k) => space.word(text, at, k === 0 && wrong ? page.touching : page.ink));
   space.names(surroundings, touching);
   space.end();
 }

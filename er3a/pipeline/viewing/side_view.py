@@ -244,7 +244,9 @@ def _across(label: Label, column_mm: float | None) -> float:
 
 
 def _lead(label: Label, place: Reals) -> Markup:
-    """The line of a label: to its place, or where it has a start from there."""
+    """The line of a label: from its start, or to where it is written beside its place."""
+    if label.start is None and place[0] == label.at[0]:
+        return Markup("")
     start, dashed = (label.at, "") if label.start is None else (label.start, "dashed")
     line = _line(np.stack([start, label.at, place]))
     return Markup('<polyline class="lead {} {}" points="{}"/>').format(label.kind, dashed, line)

@@ -11,7 +11,6 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.comparison.compare import shift_between
-from er3a.geometry.transforms import translation
 from er3a.kinematics.forward import forward
 from er3a.pipeline.language import own_title, tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
@@ -25,7 +24,7 @@ from er3a.pipeline.messages.trajectory import (
     strategy_text,
     strategy_word,
 )
-from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_of, opened, row_of
+from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, fix_of, opened, row_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -48,11 +47,9 @@ from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, alternative_table, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
-from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
 Rows = TypeVar("Rows", bound=model.MotionRows)
-DISTANCE = 0.6  # of an arm's size, between two
 DRAWN = 250  # points of a curve
 MAX_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
 
@@ -98,19 +95,24 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
 
 
 def _both_arms(study: Study, stored: Stored[model.TrajectoryResults], played: Sequence[PlayedMotion]) -> Markup:
-    """An arm whose table evidence contradicts beside that of the table to use instead, at the same joint values."""
+    """An arm whose table evidence contradicts in that of the table to use instead, at the same joint values, opened where
+    their tools are farthest from each other."""
     robot, instead = study.robot(stored.robot), alternative_table(study, stored)
     right = study.robot(instead) if instead else robot
     if right is robot or right.joints != robot.joints:
         return player(robot, played)
-    other = right.replace(base=translation(0.0, -DISTANCE * size_of(robot), 0.0) @ right.base)
-    motions = []
+    arms, seen = (robot, right), []
+    zero, *_ = shift_between(*(forward(arm, np.zeros((1, arm.joints))) for arm in arms))
     for motion in played:
-        off = shift_between(forward(robot, motion.q), forward(right, motion.q))
-        far = fixed(1000 * float(off.max()), 0)
-        text = tr("The same joint angles put the tool up to {far} mm off.", far=far)
-        motions.append(replace(motion, text=text, beside=(motion.q,)))
-    return player(robot, motions, beside=(other,), signs=[own_title(each.title) for each in (robot, other)])
+        ends = [forward(arm, motion.q) for arm in arms]
+        off = shift_between(*ends)
+        t, (start, end) = float(motion.t[off.argmax()]), (T[off.argmax(), :3, 3].tolist() for T in ends)
+        far, most = (fixed(1000 * float(each), 0) for each in (off.max(), zero))
+        text = tr("Same joint angles, other geometry: tool up to {far} mm off, {most} mm at zero.", far=far, most=most)
+        mark = Mark(t, t, start, end, with_unit(far, "mm"))
+        seen.append(replace(motion, text=text, beside=(motion.q,), marks=[mark]))
+    signs = [own_title(each.title) for each in arms]
+    return player(robot, seen, beside=(right,), signs=signs, opened=(seen[0].name, seen[0].marks[0].t0))
 
 
 def paths_answer(robot: Robot, results: model.TrajectoryResults) -> Answer:

@@ -43,7 +43,6 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         output,
         _answer(summary, placing, [] if known else [payload_key(known, robot)]),
         labelled=_labelled(study, stored, contradicted),
-        at_side=contradicted,
         turning=workspace_figures.in_space(robot, results, scene, trays),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],

@@ -10,16 +10,17 @@ from markupsafe import Markup
 from er3a.collision.scene import Scene
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import skeleton
+from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed
-from er3a.pipeline.messages.workspace import reaches
+from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.turning import Layer, Solids, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
-from er3a.pipeline.viewing.drawn import drawn_scene, floor_of
+from er3a.pipeline.viewing.drawn import drawn_scene, floor_of, frame_between, poses_at
 from er3a.pipeline.viewing.palette import VERDICTS, VOIDS
-from er3a.pipeline.viewing.side_view import UPRIGHT, DrawnLine, Kind, Label, SeenArm, border_lines, dimension, side_view
+from er3a.pipeline.viewing.side_view import DrawnLine, Kind, Label, SeenArm, border_lines, dimension, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
@@ -27,6 +28,7 @@ from er3a.workspace.voids import mesh as surface_of
 
 REACHED = "#9ecae1"
 ASIDE = (0.12, 0.28)  # of the reach, from a void before axis 1 to its name
+WIDE = 1.7  # width of the figure of two arms, of its height
 BELOW = 0.08  # of the reach, from what is reached down to its dimension
 
 
@@ -83,12 +85,38 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None,
         if len(faces):
             corners = 1000 * _smoothed(vertices.point_m[vertices.void == i], faces)
             layers.append(Layer(void_name(i, void), corners, VOIDS[void.kind], faces=faces, address=f"hole-{i}"))
-    solids = surroundings(robot, scene)
+    section, start = results.border, results.summary.axis.point_m
+    far = int(section.rho_m.argmax())
+    middle = start + section.z_m[far] * np.array(results.summary.axis.direction)
+    reach = (middle.tolist(), (middle + [section.rho_m[far], 0, 0]).tolist(), reaches(results.summary))
+    solids = surroundings(robot, scene, [] if results.summary.is_flat else [reach])
     for i, tray in enumerate(trays, start=1):
         colour = VERDICTS["pass" if i == 1 else "caution"]
         drawn, *stand = drawn_scene(tray.parts, robot)
-        solids.append(Solids(tray.name, [drawn | {"colour": colour}, *stand], np.eye(4)[None], colour, f"tray-{i}"))
+        parts, address = [drawn | {"colour": colour}, *stand], f"tray-{i}"
+        reached = _reaching_in(robot, results, tray)
+        solids.append(Solids(tray.name, parts, np.eye(4)[None], colour, address, reached, _ways(robot, tray)))
     return turning_figure(layers, solids, results.summary.axis.point_m[1], floor_of(scene) or 0.0)
+
+
+def _reaching_in(robot: Robot, results: model.WorkspaceResults, tray: Tray) -> list[Reals]:
+    """The arm's poses with its tool in the middle of a tray, in the configuration that serves it; none where that has
+    no name."""
+    task = results.summary.placement.task
+    centre, way = np.array(tray.place.centre_m), np.array(task.tool_direction)
+    found = inverse(robot, frame_between(centre - way, centre + way))
+    q = found.q[found.within_limits & (found.label == tray.place.branch)]
+    return poses_at(robot, q[0]).tolist() if len(q) else []
+
+
+def _ways(robot: Robot, tray: Tray) -> list[tuple[list[float], list[float], str]]:
+    """From the base to the middle of a tray: along x and y at the base's height, then up beside the stand."""
+    x, y, z = tray.place.centre_m
+    foot = robot.base[:3, 3]
+    corners = [foot, foot + [x, 0, 0], foot + [x, y, 0]]
+    beside = foot + [x + tray.place.size_m[0] / 2, y, 0]
+    ends = [*zip(corners, corners[1:], "xy"), (beside, beside + [0, 0, z], "z")]
+    return [(a.tolist(), b.tolist(), f"{axis} {millimetres([(b - a) @ np.ones(3)])} mm") for a, b, axis in ends if (a != b).any()]
 
 
 def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals, Integers]:
@@ -142,7 +170,7 @@ def labelled(arms: Sequence[tuple[Robot, model.WorkspaceResults, Kind]], floor_m
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([-far / 5, below - BELOW * far]), kind))
         over += dimension(far, below, height, kind)
-    return side_view(seen, floor_mm, ratio=UPRIGHT if arms[1:] else 1.2, labels=labels, over=over)
+    return side_view(seen, floor_mm, ratio=WIDE if arms[1:] else 1.2, labels=labels, over=over)
 
 
 def litres(void: model.VoidSummary) -> str:
