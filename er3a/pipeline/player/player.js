@@ -136,20 +136,19 @@ function draw() {
     const times = [from, ...motion.times.filter((time) => time > from && time < until), until];
     space.line(times.map((time) => column(posesOf(arms[0], valuesAt(motion.times, motion.values[0], time)).at(-1), 3)), data.colours[status], 5);
   }
-  for (const T of poses.map((own) => own.at(-1))) {
-    const origin = column(T, 3);
-    for (const c of [0, 1, 2]) space.line([origin, add(origin, scaled(column(T, c), 0.09 * data.size))], data.axes[c], 3);
-  }
+  const axes = poses.flatMap((own) => [0, 1, 2].map((c) => [column(own.at(-1), 3), add(column(own.at(-1), 3), scaled(column(own.at(-1), c), 0.09 * data.size))]));
+  axes.forEach((axis, i) => space.line(axis, data.axes[i % 3], 3));
   const worst = GRAVEST.find((status) => now.some((event) => event.status === status)); // what comes with it is not named
   for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j]);
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
-  space.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
+  space.keepClear([...axes.flatMap(([a, b]) => [b, scaled(add(a, b), 0.5)]), motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) {
     const css = touching.size || wrong ? page.touching : page.ink;
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
     else space.line([from, to], ...(text ? [css, 4] : [data.colours.sight, 1.5, false]));
+    if (text && String(from) !== String(to)) for (const end of [from, to]) space.dot(end, css, 4);
     if (text) space.word(text, scaled(add(from, to), 0.5), css);
   }
   if (motion.loads) tellLoads(poses[0]);
@@ -184,10 +183,12 @@ function singularAxis(j, T) {
 function tellLoads(poses) {
   const most = Math.max(...motion.loads.flat().map(Math.abs).filter(Number.isFinite)) || 1;
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
-  valuesAt(motion.times, motion.loads, t).forEach((load, j) => {
+  const loads = valuesAt(motion.times, motion.loads, t);
+  const alone = loads.filter(Number.isFinite).length === 1; // a bar would be full
+  loads.forEach((load, j) => {
     if (Number.isNaN(load)) return;
     const felt = Math.abs(load) > 0.01 * most; // what is not is told in grey, without a bar
-    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt ? Math.abs(load) / most : null);
+    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt && !alone ? Math.abs(load) / most : null);
   });
 }
 

@@ -331,7 +331,7 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
 def _looked_at(robot: Robot) -> tuple[list[float], float]:
     """Where the picture's eye looks, (3,), m, and about how long the arm is from there, m."""
     tool = frames(robot, (robot.lower + robot.upper) / 2)[-1, :3, 3]
-    return ((robot.base[:3, 3] + tool) / 2).tolist(), 0.62 * drawn_size(robot)
+    return ((robot.base[:3, 3] + tool) / 2).tolist(), 0.68 * drawn_size(robot)
 
 
 def singular_sets(robot: Robot) -> dict[str, Any] | None:

@@ -26,7 +26,7 @@ from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
-TALL = 4.3  # inches, of figures at the side of the player
+TALL = 5.4  # inches, of figures at the side of the player
 KEY: dict[str, Any] = {
     "fontsize": 10,
     "handlelength": 1.2,
@@ -182,7 +182,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     return Answer(
         headline,
         "" if limited or over else tr("Motor limits are missing."),
-        tr("At least: without {parts}.", parts=joined(left, ", ")) if left else "",
+        tr("Lower bounds: {parts} are missing.", parts=joined(left, ", ")) if left else "",
         [
             (moving, tr("J{joint} moving", joint=worst.joint)),
             (holding, tr("J{joint} holding", joint=worst.joint)),

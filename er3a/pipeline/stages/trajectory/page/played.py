@@ -5,13 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from er3a.collision.pairs import names_of
+from er3a.comparison.compare import shift_between
 from er3a.finding import Finding, fact, is_one
+from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
@@ -33,8 +37,12 @@ from er3a.pipeline.messages.trajectory import (
     switch_text,
 )
 from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.player.player import player
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.page import alternative_table
 from er3a.planning.motion_faults import RATES, rate_ratio
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -350,3 +358,24 @@ def kinds(path: model.PathSummary) -> tuple[tuple[str, tuple[model.Stretch, ...]
         (tr("undecided"), path.undecided),
         (tr("collision"), path.collisions),
     )
+
+
+def both_arms(study: Study, stored: Stored[Any], played: Sequence[PlayedMotion]) -> Markup:
+    """An arm whose table evidence contradicts over that of the table to use instead, at the same joint values, opened
+    where their tools are farthest from each other."""
+    robot, instead = study.robot(stored.robot), alternative_table(study, stored)
+    right = study.robot(instead) if instead else robot
+    if right is robot or right.joints != robot.joints:
+        return player(robot, played)
+    arms, seen = (robot, right), []
+    zero, *_ = shift_between(*(forward(arm, np.zeros((1, arm.joints))) for arm in arms))
+    for motion in played:
+        ends = [forward(arm, motion.q) for arm in arms]
+        off = shift_between(*ends)
+        t, (start, end) = float(motion.t[off.argmax()]), (T[off.argmax(), :3, 3].tolist() for T in ends)
+        far, most = (fixed(1000 * float(each), 0) for each in (off.max(), zero))
+        text = tr("Same joint angles, other geometry: tool up to {far} mm off, {most} mm at zero.", far=far, most=most)
+        mark = Mark(t, t, start, end, with_unit(far, "mm"))
+        seen.append(replace(motion, text=text, beside=(motion.q,), marks=[mark], ghosts=()))
+    signs = [own_title(each.title) for each in arms]
+    return player(robot, seen, beside=(right,), signs=signs, opened=(seen[0].name, seen[0].marks[0].t0))

@@ -8,11 +8,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from markupsafe import Markup
 
-from er3a.comparison.compare import shift_between
-from er3a.kinematics.forward import forward
-from er3a.pipeline.language import own_title, tr, using, with_unit
+from er3a.pipeline.language import tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
@@ -24,7 +21,7 @@ from er3a.pipeline.messages.trajectory import (
     strategy_text,
     strategy_word,
 )
-from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, fix_of, opened, row_of
+from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_of, opened, row_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -32,6 +29,7 @@ from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.page.path_figures import fault_picture, nearness_picture, path_picture
 from er3a.pipeline.stages.trajectory.page.played import (
+    both_arms,
     faults,
     motions,
     near_assumed,
@@ -44,7 +42,7 @@ from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, ListRow, judged, may_run
 from er3a.pipeline.viewing.conditions import program_head
-from er3a.pipeline.viewing.page import Picture, alternative_table, packed_text, render_stage, whole_sentence
+from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot
@@ -87,32 +85,11 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
         drawn_paths=count,
-        player=_both_arms(study, stored, played)
+        player=both_arms(study, stored, played)
         if contradicted
         else player(robot, played, scene, opened=opened(wrong.values())),
         drawing_head=drawing_head(),
     )
-
-
-def _both_arms(study: Study, stored: Stored[model.TrajectoryResults], played: Sequence[PlayedMotion]) -> Markup:
-    """An arm whose table evidence contradicts in that of the table to use instead, at the same joint values, opened where
-    their tools are farthest from each other."""
-    robot, instead = study.robot(stored.robot), alternative_table(study, stored)
-    right = study.robot(instead) if instead else robot
-    if right is robot or right.joints != robot.joints:
-        return player(robot, played)
-    arms, seen = (robot, right), []
-    zero, *_ = shift_between(*(forward(arm, np.zeros((1, arm.joints))) for arm in arms))
-    for motion in played:
-        ends = [forward(arm, motion.q) for arm in arms]
-        off = shift_between(*ends)
-        t, (start, end) = float(motion.t[off.argmax()]), (T[off.argmax(), :3, 3].tolist() for T in ends)
-        far, most = (fixed(1000 * float(each), 0) for each in (off.max(), zero))
-        text = tr("Same joint angles, other geometry: tool up to {far} mm off, {most} mm at zero.", far=far, most=most)
-        mark = Mark(t, t, start, end, with_unit(far, "mm"))
-        seen.append(replace(motion, text=text, beside=(motion.q,), marks=[mark]))
-    signs = [own_title(each.title) for each in arms]
-    return player(robot, seen, beside=(right,), signs=signs, opened=(seen[0].name, seen[0].marks[0].t0))
 
 
 def paths_answer(robot: Robot, results: model.TrajectoryResults) -> Answer:

@@ -12,7 +12,7 @@ from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import skeleton
 from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.turning import Layer, Solids, surroundings, turning_figure
@@ -29,6 +29,7 @@ from er3a.workspace.voids import mesh as surface_of
 REACHED = "#9ecae1"
 ASIDE = (0.12, 0.28)  # of the reach, from a void before axis 1 to its name
 WIDE = 1.7  # width of the figure of two arms, of its height
+AHEAD = np.array([1.0, 0.0, 0.0])  # of the arm at zero
 BELOW = 0.08  # of the reach, from what is reached down to its dimension
 
 
@@ -85,10 +86,10 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None,
         if len(faces):
             corners = 1000 * _smoothed(vertices.point_m[vertices.void == i], faces)
             layers.append(Layer(void_name(i, void), corners, VOIDS[void.kind], faces=faces, address=f"hole-{i}"))
-    section, start = results.border, results.summary.axis.point_m
-    far = int(section.rho_m.argmax())
-    middle = start + section.z_m[far] * np.array(results.summary.axis.direction)
-    reach = (middle.tolist(), (middle + [section.rho_m[far], 0, 0]).tolist(), reaches(results.summary))
+    border, axis = results.border, results.summary.axis
+    far = border.rho_m.argmax()
+    middle = axis.point_m + border.z_m[far] * np.array(axis.direction)
+    reach = (middle.tolist(), (middle + border.rho_m[far] * AHEAD).tolist(), reaches(results.summary))
     solids = surroundings(robot, scene, [] if results.summary.is_flat else [reach])
     for i, tray in enumerate(trays, start=1):
         colour = VERDICTS["pass" if i == 1 else "caution"]
@@ -111,12 +112,14 @@ def _reaching_in(robot: Robot, results: model.WorkspaceResults, tray: Tray) -> l
 
 def _ways(robot: Robot, tray: Tray) -> list[tuple[list[float], list[float], str]]:
     """From the base to the middle of a tray: along x and y at the base's height, then up beside the stand."""
-    x, y, z = tray.place.centre_m
-    foot = robot.base[:3, 3]
-    corners = [foot, foot + [x, 0, 0], foot + [x, y, 0]]
-    beside = foot + [x + tray.place.size_m[0] / 2, y, 0]
-    ends = [*zip(corners, corners[1:], "xy"), (beside, beside + [0, 0, z], "z")]
-    return [(a.tolist(), b.tolist(), f"{axis} {millimetres([(b - a) @ np.ones(3)])} mm") for a, b, axis in ends if (a != b).any()]
+    steps = np.diag(tray.place.centre_m)
+    starts = robot.base[:3, 3] + np.cumsum([0 * AHEAD, *steps[:2]], axis=0)
+    starts[2] += tray.place.size_m[0] / 2 * AHEAD
+    return [
+        (start.tolist(), (start + step).tolist(), f"{axis} {with_unit(millimetres([step.sum()]), 'mm')}")
+        for start, step, axis in zip(starts, steps, "xyz")
+        if step.any()
+    ]
 
 
 def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals, Integers]:
