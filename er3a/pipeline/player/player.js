@@ -184,7 +184,7 @@ function tellLoads(poses) {
   const most = Math.max(...motion.loads.flat().map(Math.abs).filter(Number.isFinite)) || 1;
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
   const loads = valuesAt(motion.times, motion.loads, t);
-  const alone = loads.filter(Number.isFinite).length === 1; // a bar would be full
+  const alone = loads.filter(Number.isFinite).length === 1; // its bar would be full
   loads.forEach((load, j) => {
     if (Number.isNaN(load)) return;
     const felt = Math.abs(load) > 0.01 * most; // what is not is told in grey, without a bar
@@ -268,9 +268,8 @@ function newMotion() {
   Object.assign(bar, { min: String(start()), max: String(whole()), step: "any" });
   const beyond = { t: end(), until: whole(), status: "none", text: motion.events.at(-1)?.text || motion.name };
   const ticks = [...(whole() > end() ? [beyond] : []), ...motion.events].map((event) => {
-    const tick = document.createElement("button");
     const at = (value) => Math.min(100, (100 * (value - start())) / (whole() - start() || 1));
-    Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
+    const tick = Object.assign(document.createElement("button"), { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
     tick.style.left = `min(${at(event.t)}%, 100% - 0.6rem)`; // what is at the end is seen too
     tick.style.width = `${Math.max(0, at(event.until) - at(event.t))}%`;
     tick.addEventListener("click", () => goTo(null, event.t));
@@ -283,8 +282,7 @@ function newMotion() {
 function withCursors(figure) {
   const image = figure.querySelector("img");
   const panels = JSON.parse(figure.dataset.panels).map(([left, bottom, right, top, t0, t1, name = figure.dataset.play]) => {
-    const cursor = document.createElement("span");
-    cursor.className = "cursor";
+    const cursor = Object.assign(document.createElement("span"), { className: "cursor" });
     figure.append(cursor);
     return { left, bottom, right, top, t0, t1, name, cursor };
   });

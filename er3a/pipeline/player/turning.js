@@ -41,8 +41,7 @@ function placeOf({ points, shapes }) {
 /** Turns the picture until what the address names is before the rest; a tray is seen from near, with the arm in it from its side. */
 function face() {
   const at = placeOf(chosen());
-  const [x, y] = subtract(at, middle);
-  const near = Boolean(chosen().shapes);
+  const [[x, y], near] = [subtract(at, middle), Boolean(chosen().shapes)];
   const azimuth = Math.hypot(x, y) < 0.1 * size[0] ? data.azimuth : Math.atan2(y, x) + (near ? 0.9 : 0.35);
   Object.assign(space, { azimuth, elevation: 0.35, distance: (near ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
   refresh();
@@ -70,8 +69,7 @@ function made(layer) {
 function cloud({ colour, cut }, points) {
   const geometry = new three.BufferGeometry();
   geometry.setAttribute("position", new three.Float32BufferAttribute(points.flat(), 3));
-  const look = { color: colour, size: 2, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] };
-  return [new three.Points(geometry, new three.PointsMaterial(look))];
+  return [new three.Points(geometry, new three.PointsMaterial({ color: colour, size: 2, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] }))];
 }
 
 /** A closed surface; where it is cut, its sides count up and down in the stencil, and a sheet fills what is between them. */
@@ -100,8 +98,7 @@ function draw() {
   plane.constant = -low[1] - Number(knife.value) * size[1];
   space.begin();
   space.floor(middle, size[0] / FLOOR, data.floor);
-  const shown = chosen();
-  const near = shown?.shapes;
+  const [shown, near] = [chosen(), chosen()?.shapes];
   const isSeen = (each) => !left.has(each.name) && (each.shapes ? !each.address || each === (near ? shown : first) : !near);
   const arm = near && shown.reached.length ? shown.reached : solids[0].poses;
   for (const each of all) for (const part of each.parts) part.visible = isSeen(each);
@@ -127,8 +124,7 @@ for (const { name, colour } of all.filter(({ address }) => !address)) {
   const [label, check, swatch] = ["label", "input", "i"].map((tag) => document.createElement(tag));
   Object.assign(check, { type: "checkbox", checked: !left.has(name) });
   check.addEventListener("change", () => {
-    if (check.checked) left.delete(name);
-    else left.add(name);
+    left[check.checked ? "delete" : "add"](name);
     refresh();
   });
   swatch.style.background = colour;

@@ -16,7 +16,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.viewing.drawn import SCENE_COLOUR, drawn_arm, drawn_scene, poses_at
 from er3a.pipeline.viewing.page import page_environment
-from er3a.pipeline.viewing.palette import BODY, rgb
+from er3a.pipeline.viewing.palette import BODY
 from er3a.pipeline.viewing.still import Still
 from er3a.robots.robot import Robot
 
@@ -130,8 +130,6 @@ def _still(layers: Sequence[Layer], solids: Sequence[Solids], data: dict[str, An
         points = layer.points_mm / 1000
         if layer.faces is not None:
             picture.surface(points, layer.faces, layer.colour, 0.3 if layer.cut else 1.0)
-        else:
-            picture.points(points, np.tile(rgb(layer.colour), (len(points), 1)) / 255, 2.0)
     return picture.markup()
 
 

@@ -245,7 +245,7 @@ def _across(label: Label, column_mm: float | None) -> float:
 
 
 def _lead(label: Label, place: Reals) -> Markup:
-    """The line of a label: from its start, or to where it is written beside its place."""
+    """The line of a label: from its start, or to where it is written if that is not its place."""
     if label.start is None and place[0] == label.at[0]:
         return Markup("")
     start, dashed = (label.at, "") if label.start is None else (label.start, "dashed")

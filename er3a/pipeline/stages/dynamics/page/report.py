@@ -56,8 +56,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     torque.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
     caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
-    alt = tr("Torques over time for {path}.", path=path.name)
-    return Picture(figure, alt, caption, [(torque, path.name)])
+    return Picture(figure, caption, caption, [(torque, path.name)])
 
 
 def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.HoldingTorque) -> Picture | None:
@@ -157,19 +156,12 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
     loads = [load for path in summary.paths if path.counts for load in path.joints]
-    rows, idle = [], []
+    rows = []
     for motor in order:
-        if not limited and motor.unit == worst.unit and motor.peak < SEEN * longest:
-            idle.append(motor.joint)
-            continue
         moment = _moment_of(results, motor)
-        name = joined([f"J{motor.joint}", moment[0]], ", ")
         off = max(load.tolerance for load in loads if load.joint == motor.joint and load.peak == motor.peak)
+        name = f"J{motor.joint}, {moment[0]}"
         rows.append(_row(motor, (motor.peak, off), name, moment, longest, motor.peak_limit))
-    if idle:
-        most = at_most(max(load.peak + load.tolerance for load in loads if load.joint in idle), 1)
-        names = joined((f"J{joint}" for joint in sorted(idle)), ", ")
-        rows.append(ListRow("none", names, with_unit(f"≤ {most}", worst.unit), "#motors"))
     still = [
         _row(
             motor, (motor.holding, held.tolerance), holding_name(motor.joint), (holding_name(motor.joint), 0.0), longest

@@ -54,8 +54,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         output,
         _answer(summary, chosen),
         player=both_arms(study, stored, played)
-        if stored.rests_on.get("validation") == "fail"
-        else player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen)),
+        or player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen)),
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target)) for target in chosen],

@@ -362,20 +362,20 @@ def kinds(path: model.PathSummary) -> tuple[tuple[str, tuple[model.Stretch, ...]
 
 def both_arms(study: Study, stored: Stored[Any], played: Sequence[PlayedMotion]) -> Markup:
     """An arm whose table evidence contradicts over that of the table to use instead, at the same joint values, opened
-    where their tools are farthest from each other."""
-    robot, instead = study.robot(stored.robot), alternative_table(study, stored)
-    right = study.robot(instead) if instead else robot
-    if right is robot or right.joints != robot.joints:
-        return player(robot, played)
-    arms, seen = (robot, right), []
-    zero, *_ = shift_between(*(forward(arm, np.zeros((1, arm.joints))) for arm in arms))
+    where their tools are farthest from each other; empty for other arms."""
+    instead = stored.rests_on.get("validation") == "fail" and alternative_table(study, stored)
+    arms = [study.robot(name) for name in (stored.robot, instead) if name]
+    if not instead or arms[0].joints != arms[1].joints:
+        return Markup()
+    seen = []
     for motion in played:
-        ends = [forward(arm, motion.q) for arm in arms]
-        off = shift_between(*ends)
-        t, (start, end) = float(motion.t[off.argmax()]), (T[off.argmax(), :3, 3].tolist() for T in ends)
-        far, most = (fixed(1000 * float(each), 0) for each in (off.max(), zero))
-        text = tr("Same joint angles, other geometry: tool up to {far} mm off, {most} mm at zero.", far=far, most=most)
-        mark = Mark(t, t, start, end, with_unit(far, "mm"))
+        ends = [forward(arm, np.vstack([motion.q, 0 * motion.q[:1]])) for arm in arms]
+        *off, zero = shift_between(*ends).tolist()
+        k = np.argmax(off)
+        far, most = (with_unit(fixed(1000 * each, 0), "mm") for each in (off[k], zero))
+        text = tr("Same joint angles, other geometry: tool up to {far} off, {most} at zero.", far=far, most=most)
+        start, end = (T[k, :3, 3].tolist() for T in ends)
+        mark = Mark(motion.t[k], motion.t[k], start, end, far)
         seen.append(replace(motion, text=text, beside=(motion.q,), marks=[mark], ghosts=()))
-    signs = [own_title(each.title) for each in arms]
-    return player(robot, seen, beside=(right,), signs=signs, opened=(seen[0].name, seen[0].marks[0].t0))
+    first = seen[0].name, seen[0].marks[0].t0
+    return player(arms[0], seen, beside=arms[1:], signs=[own_title(arm.title) for arm in arms], opened=first)

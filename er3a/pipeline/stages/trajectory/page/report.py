@@ -85,9 +85,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
         drawn_paths=count,
-        player=both_arms(study, stored, played)
-        if contradicted
-        else player(robot, played, scene, opened=opened(wrong.values())),
+        player=both_arms(study, stored, played) or player(robot, played, scene, opened=opened(wrong.values())),
         drawing_head=drawing_head(),
     )
 
@@ -202,13 +200,7 @@ def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
 
 
 def _figure(path: model.PathSummary, rows: model.PathChecks) -> Picture:
-    text = path_text(path)
-    alt = tr(
-        "Joint angles and velocities over time for {path}. {finding}.",
-        path=path.name,
-        finding=text,
-    )
-    return path_picture(path, _drawn(path, rows), alt, whole_sentence(text))
+    return path_picture(path, _drawn(path, rows), whole_sentence(path_text(path)))
 
 
 def _over_time(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:

@@ -182,8 +182,7 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
         made = (
             tr("error at the grasp, 95 %, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
         )
-        value, allowed = fixed(worst[0].together, 1), with_unit(f"{limit:g}", "mm")
-        keys = [(tr("{value} of {limit}", value=value, limit=allowed), made)]
+        keys = [(with_unit(f"{fixed(worst[0].together, 1)} / {limit:g}", "mm"), made)]
     if found:
         half = fixed(max(found.hand_eye.half_width_mm), 2)
         place = f"{_listed(found.hand_eye.xyz_mm, 0)} ± {half}"

@@ -94,24 +94,23 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None,
     for i, tray in enumerate(trays, start=1):
         colour = VERDICTS["pass" if i == 1 else "caution"]
         drawn, *stand = drawn_scene(tray.parts, robot)
-        parts, address = [drawn | {"colour": colour}, *stand], f"tray-{i}"
-        reached = _reaching_in(robot, results, tray)
-        solids.append(Solids(tray.name, parts, np.eye(4)[None], colour, address, reached, _ways(robot, tray)))
+        parts = [drawn | {"colour": colour}, *stand]
+        shown = f"tray-{i}", _reaching_in(robot, tray), _ways(robot, tray)
+        solids.append(Solids(tray.name, parts, np.eye(4)[None], colour, *shown))
     return turning_figure(layers, solids, results.summary.axis.point_m[1], floor_of(scene) or 0.0)
 
 
-def _reaching_in(robot: Robot, results: model.WorkspaceResults, tray: Tray) -> list[Reals]:
+def _reaching_in(robot: Robot, tray: Tray) -> list[Reals]:
     """The arm's poses with its tool in the middle of a tray, in the configuration that serves it; none where that has
     no name."""
-    task = results.summary.placement.task
-    centre, way = np.array(tray.place.centre_m), np.array(task.tool_direction)
+    centre, way = np.array(tray.place.centre_m), np.array(tray.task.tool_direction)
     found = inverse(robot, frame_between(centre - way, centre + way))
     q = found.q[found.within_limits & (found.label == tray.place.branch)]
     return poses_at(robot, q[0]).tolist() if len(q) else []
 
 
 def _ways(robot: Robot, tray: Tray) -> list[tuple[list[float], list[float], str]]:
-    """From the base to the middle of a tray: along x and y at the base's height, then up beside the stand."""
+    """From the base to the middle of a tray: along x and y at the base's height, then up in front of the stand."""
     steps = np.diag(tray.place.centre_m)
     starts = robot.base[:3, 3] + np.cumsum([0 * AHEAD, *steps[:2]], axis=0)
     starts[2] += tray.place.size_m[0] / 2 * AHEAD
