@@ -165,18 +165,14 @@ def _placement_context(placement: model.Placement) -> dict[str, Any]:
 
 def _picture(robot: Robot, results: model.WorkspaceResults, capability: model.CapabilitySummary) -> Picture:
     """Slices of what the tool can do."""
-    caption = _slices_caption(capability)
-    return Picture(upright_slices(robot, capability, results.capability), caption, caption)
-
-
-def _slices_caption(capability: model.CapabilitySummary) -> str:
     overall = capability.overall
-    return tr(
+    caption = tr(
         "A reached cell offers {mean} % of the orientations asked on average, the best one {best} %. Plan work where "
         "all three are high; rims are reached only with the arm stretched, folded or twisted.",
         mean=number(100 * overall.mean_reachability, 2),
         best=number(100 * overall.best_reachability, 3),
     )
+    return Picture(upright_slices(robot, capability, results.capability), caption, caption)
 
 
 def _asked_text(capability: model.CapabilitySummary) -> str:
