@@ -370,7 +370,7 @@ def both_arms(study: Study, stored: Stored[Any], played: Sequence[PlayedMotion])
     seen = []
     for motion in played:
         ends = [forward(arm, np.vstack([motion.q, 0 * motion.q[:1]])) for arm in arms]
-        *off, zero = shift_between(*ends).tolist()
+        *off, zero = shift_between(*ends)
         k = np.argmax(off)
         far, most = (with_unit(fixed(1000 * each, 0), "mm") for each in (off[k], zero))
         said = tr("Same joint angles, other geometry: tool up to {far} off, {most} at zero.", far=far, most=most)
