@@ -111,6 +111,7 @@ function draw() {
   for (const each of named) space.keepClear(each.points?.filter((_, i) => i % SPARSE === 0) ?? [placeOf(each)], each.points ? 0 : ARM * size[0]);
   for (const [from, to, text] of near ? shown.ways : solids[0].ways) {
     space.line([from, to], space.page.accent, 3);
+    space.keepClear([...Array(21).keys()].map((i) => add(scaled(from, 1 - i / 20), scaled(to, i / 20))), 0);
     space.word(text, add(scaled(from, 0.4), scaled(to, 0.6)), space.page.accent);
   }
   for (const each of named) space.word(each.name, placeOf(each), each === shown ? space.page.accent : space.page.ink);
@@ -134,6 +135,5 @@ for (const { name, colour } of all.filter(({ address }) => !address)) {
 
 knife.addEventListener("input", refresh);
 addEventListener("hashchange", () => chosen() && face());
-refresh();
-if (chosen()) face();
+(chosen() ? face : refresh)();
 performance.mark("turning");
