@@ -132,8 +132,8 @@ function draw() {
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
-    if (status === "plain" || from === until) continue;
-    const times = [from, ...motion.times.filter((time) => time > from && time < until), until];
+    if (status === "plain" || from >= Math.min(until, end())) continue;
+    const times = [from, ...motion.times.filter((time) => time > from && time < until), Math.min(until, end())];
     space.line(times.map((time) => column(posesOf(arms[0], valuesAt(motion.times, motion.values[0], time)).at(-1), 3)), data.colours[status], 5);
   }
   const axes = poses.flatMap((own) => [0, 1, 2].map((c) => [column(own.at(-1), 3), add(column(own.at(-1), 3), scaled(column(own.at(-1), c), 0.09 * data.size))]));

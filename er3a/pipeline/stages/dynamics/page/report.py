@@ -155,20 +155,23 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
-    loads = [load for path in summary.paths if path.counts for load in path.joints]
     rows = []
     for motor in order:
         moment = _moment_of(results, motor)
-        off = max(load.tolerance for load in loads if load.joint == motor.joint and load.peak == motor.peak)
-        name = f"J{motor.joint}, {moment[0]}"
-        rows.append(_row(motor, (motor.peak, off), name, moment, longest, motor.peak_limit))
+        off = max(
+            load.tolerance
+            for path in summary.paths
+            for load in path.joints
+            if path.counts and load.joint == motor.joint and load.peak == motor.peak
+        )
+        rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {moment[0]}", moment, longest, motor.peak_limit))
     still = [
         _row(
             motor, (motor.holding, held.tolerance), holding_name(motor.joint), (holding_name(motor.joint), 0.0), longest
         )
         for motor in order
         for held in summary.holding
-        if held.joint == motor.joint and motor.holding >= SEEN * longest
+        if held.joint == motor.joint
     ]
     left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
     return Answer(
@@ -180,7 +183,10 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
             (holding, tr("J{joint} holding", joint=worst.joint)),
             payload,
         ],
-        (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
+        [
+            Group(title, [row for row in found if row.length >= SEEN])
+            for title, found in ((tr("Greatest torque on the paths"), rows), (tr("Holding, in the worst pose"), still))
+        ],
         None if limited else Fix(tr("enter the motors' peak torques."), "#motors", False),
     )
 

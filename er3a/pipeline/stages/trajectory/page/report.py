@@ -69,7 +69,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count))
         links = _programs(path, files, lines, met or {})
-        drawn = _figure(path, rows) if i < count else None
+        drawn = path_picture(path, _drawn(path, rows), whole_sentence(path_text(path))) if i < count else None
         over_time = _over_time(path, results) if i < count else []
         sections.append({**_section(path, drawn, links, summary), "over_time": over_time})
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
@@ -197,10 +197,6 @@ def _clear_of(path: model.PathSummary) -> str:
 
 def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
     return bool(program["file"].rpartition(".")[0] == repair_name(path.name))
-
-
-def _figure(path: model.PathSummary, rows: model.PathChecks) -> Picture:
-    return path_picture(path, _drawn(path, rows), whole_sentence(path_text(path)))
 
 
 def _over_time(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:
