@@ -138,11 +138,9 @@ WORDS: dict[str, Any] = {
         "shoulder": N_("Near the shoulder singularity: the wrist centre is {distance} from the plane of axes 1 and 2."),
     },
     "at": {
-        "wrist": N_("At the wrist singularity: axes 4 and 6 are parallel. Joint moves only."),
-        "elbow": N_("At the elbow singularity: the arm is straight or folded. Joint moves only."),
-        "shoulder": N_(
-            "At the shoulder singularity: the wrist centre is in the plane of axes 1 and 2. Joint moves only."
-        ),
+        "wrist": N_("At the wrist singularity: axes 4 and 6 parallel. Joint moves only."),
+        "elbow": N_("At the elbow singularity: arm straight or folded. Joint moves only."),
+        "shoulder": N_("Shoulder singularity: wrist centre in plane of axes 1, 2. Joint moves only."),
     },
     "near_unnamed": N_("Near a singularity: the smallest singular value is {value}."),
     "solutions": N_("All IK solutions of this pose"),
@@ -168,16 +166,9 @@ WORDS: dict[str, Any] = {
         "orientation": N_("the wrist would have to tilt {gap} further than it can"),
     },
     "free": {
-        "wrist": N_(
-            "Axes 4 and 6 are collinear: J4 and J6 compensate each other, so there are infinitely many "
-            "solutions; J4 is kept here."
-        ),
-        "elbow": N_(
-            "The wrist centre is on axis 2: J2 is free, so there are infinitely many solutions; J2 is kept here."
-        ),
-        "shoulder": N_(
-            "The wrist centre is on axis 1: J1 is free, so there are infinitely many solutions; J1 is kept here."
-        ),
+        "wrist": N_("Axes 4 and 6 are collinear: infinitely many solutions; J4 is kept."),
+        "elbow": N_("The wrist centre is on axis 2: infinitely many solutions; J2 is kept."),
+        "shoulder": N_("The wrist centre is on axis 1: infinitely many solutions; J1 is kept."),
     },
     "found": N_("solution {number}"),
     "iterated": N_("{count} found by iteration; there may be others"),
