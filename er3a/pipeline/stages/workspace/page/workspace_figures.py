@@ -86,16 +86,17 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None,
         if len(faces):
             corners = 1000 * _smoothed(vertices.point_m[vertices.void == i], faces)
             layers.append(Layer(void_name(i, void), corners, VOIDS[void.kind], faces=faces, address=f"hole-{i}"))
-    border, axis = results.border, results.summary.axis
-    far = border.rho_m.argmax()
-    middle = axis.point_m + border.z_m[far] * np.array(axis.direction)
-    reach = (middle.tolist(), (middle + border.rho_m[far] * AHEAD).tolist(), reaches(results.summary))
-    solids = surroundings(robot, scene, [] if results.summary.is_flat else [reach])
+    border, axis, ways = results.border, results.summary.axis, []
+    if not results.summary.is_flat and not results.summary.proof.bars:
+        far = border.rho_m.argmax()
+        middle = axis.point_m + border.z_m[far] * np.array(axis.direction)
+        ways = [(middle.tolist(), (middle + border.rho_m[far] * AHEAD).tolist(), reaches(results.summary))]
+    solids = surroundings(robot, scene, ways)
     for i, tray in enumerate(trays, start=1):
         colour = VERDICTS["pass" if i == 1 else "caution"]
         drawn, *stand = drawn_scene(tray.parts, robot)
         parts = [drawn | {"colour": colour}, *stand]
-        shown = f"tray-{i}", _reaching_in(robot, tray), _ways(robot, tray)
+        shown = f"tray-{i}", _reaching_in(robot, tray), _ways(tray)
         solids.append(Solids(tray.name, parts, np.eye(4)[None], colour, *shown))
     return turning_figure(layers, solids, results.summary.axis.point_m[1], floor_of(scene) or 0.0)
 
@@ -109,10 +110,10 @@ def _reaching_in(robot: Robot, tray: Tray) -> list[Reals]:
     return poses_at(robot, q[0]).tolist() if len(q) else []
 
 
-def _ways(robot: Robot, tray: Tray) -> list[tuple[list[float], list[float], str]]:
-    """From the base to the middle of a tray: along x and y at the base's height, then up in front of the stand."""
+def _ways(tray: Tray) -> list[tuple[list[float], list[float], str]]:
+    """From the origin to the middle of a tray: along x and y, then up in front of the stand."""
     steps = np.diag(tray.place.centre_m)
-    starts = robot.base[:3, 3] + np.cumsum([0 * AHEAD, *steps[:2]], axis=0)
+    starts = np.cumsum([0 * AHEAD, *steps[:2]], axis=0)
     starts[2] += tray.place.size_m[0] / 2 * AHEAD
     return [
         (start.tolist(), (start + step).tolist(), f"{axis} {with_unit(millimetres([step.sum()]), 'mm')}")
