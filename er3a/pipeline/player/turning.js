@@ -38,12 +38,12 @@ function placeOf({ points, shapes }) {
   return points ? points.reduce((a, b) => (b[2] > a[2] ? b : a)) : add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
 }
 
-/** Turns the picture until what the address names is before the rest; a tray is seen from near, with the arm in it from its side. */
+/** Turns the picture until what the address names is before the rest; a tray with the arm in it, from its side, a void without what is around. */
 function face() {
   const at = placeOf(chosen());
   const [[x, y], near] = [subtract(at, middle), Boolean(chosen().shapes)];
-  const azimuth = Math.hypot(x, y) < 0.1 * size[0] ? data.azimuth : Math.atan2(y, x) + (near ? 0.9 : 0.35);
-  Object.assign(space, { azimuth, elevation: 0.35, distance: (near ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
+  const about = Math.hypot(x, y) < 0.1 * size[0]; // axis 1
+  Object.assign(space, { azimuth: about ? data.azimuth : Math.atan2(y, x) + (near ? 0.9 : 0.35), elevation: 0.35, distance: (near || about ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
   refresh();
 }
 
@@ -99,7 +99,7 @@ function draw() {
   space.begin();
   space.floor(middle, size[0] / FLOOR, data.floor);
   const [shown, near] = [chosen(), chosen()?.shapes];
-  const isSeen = (each) => !left.has(each.name) && (each.shapes ? !each.address || each === (near ? shown : first) : !near);
+  const isSeen = (each) => !left.has(each.name) && (each === solids[0] || (each.shapes ? !shown?.points && (!each.address || each === (near ? shown : first)) : !near));
   const arm = near && shown.reached.length ? shown.reached : solids[0].poses;
   for (const each of all) for (const part of each.parts) part.visible = isSeen(each);
   for (const each of solids.filter(isSeen)) {
