@@ -197,9 +197,7 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
     assert said.endswith("Not compared, or not all of it: still, lost.")
     count = 1 + over
     assert line_of(found).endswith(f"in the way of {count} of the 4 motions that pass without it.")
-    assert found.rows == [
-        [found.tray.where, "350, 0, 400", "150 × 200 × 50", f"{int(over)} of 2 paths, 1 of 2 programs", "–", "–"]
-    ]
+    assert found.hindered(found.tried[0]) == ({"trajectory": ["below"]} if over else {}) | {"programs": ["through"]}
 
 
 def line_of(found):
@@ -227,9 +225,9 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     found = placing(stored, robot, {}, sound)
     assert line_of(found) == (
         "On a stand 375 mm high on floor, centre (350, 500, 400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
-        "of none of the 1 motions that pass without it (1 programs); nothing was planned around it."
+        "of none of the 1 motions that pass without it; nothing was planned around it."
     )
-    assert [row[3] for row in found.rows] == ["0 of 1 programs", "1 of 1 programs"]
+    assert [found.hindered(each) for each in found.tried] == [{}, {"programs": ["through"]}]
     assert found.met == {"programs": {}}  # of the place that is recommended
     half = replace(found.tray.place, size_m=(0.0125, 0.15, 0.05))
     assert replace(found.tray, place=half).edges == "12.5 × 150 × 50"
@@ -337,8 +335,7 @@ def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     )
     found = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": ["far"]})
     assert found.met == {"programs": {}}
-    parts = "(1 programs); nothing was planned around it."
-    assert line_of(found).endswith(f"in the way of none of the 1 motions that pass without it {parts}")
+    assert line_of(found).endswith("none of the 1 motions that pass without it; nothing was planned around it.")
     assert found.compared.startswith("Neither the tool point nor a link's shape nor what is carried was found in the")
     nothing = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": []})
     assert line_of(nothing).endswith("no motion passes that it could be in the way of.")

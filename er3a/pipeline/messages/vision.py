@@ -19,9 +19,9 @@ from er3a.vision.hand_eye import HandEye, spread_of
 PARTS = words({"move": "move to the approach", "approach": "approach", "retreat": "retreat"})
 MENDING = words(
     {
-        "half_turn_x": "the board is detected turned by 180° about its x axis",
-        "half_turn_y": "the board is detected turned by 180° about its y axis",
-        "half_turn_z": "the board is detected turned by 180° in its plane",
+        "half_turn_x": "board detected turned by 180° about its x axis",
+        "half_turn_y": "board detected turned by 180° about its y axis",
+        "half_turn_z": "board detected turned by 180°",
         "quarter_turn_z": "the board is detected turned by 90° in its plane",
         "mirrored_tilt": "the board's tilt is mirrored, as of a flat board seen from far or head-on",
         "rotation": "no typical detector error explains it",

@@ -188,7 +188,7 @@ def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Resul
         lowest = arm.points_mm[arm.points_mm[:, 1].argmin()]
         if floor_mm is not None and lowest[1] < floor_mm:
             labels.append(Label(tr("through the floor"), lowest, "wrong"))
-    return side_view(seen, floor_mm, ratio=2.03, labels=labels, column_mm=beyond(seen))
+    return side_view(seen, floor_mm, ratio=2.06, labels=labels, column_mm=beyond(seen))
 
 
 def _reach(stored: Results) -> WorkspaceSummary | None:

@@ -23,7 +23,7 @@ const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, nowShown] = ["arm", "motion", "time", "clock", "now-shown"].map(part);
-const unjudged = document.querySelector(".answer .no_verdict") && { events: [], marks: [], ...(data.others.length ? {} : { text: words.not_judged }) }; // of a wrong table
+const unjudged = document.querySelector(".answer .no_verdict") && { events: [], ...(data.others.length ? {} : { marks: [], text: words.not_judged }) }; // of a wrong table
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const floor = data.floor ?? column(table.base, 3)[2];
 
@@ -119,7 +119,7 @@ function draw() {
   space.begin();
   space.floor(column(table.base, 3), data.size / 10, floor);
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
-  arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value));
+  arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value, k === 0 && Boolean(wrong)));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
   const numbered = others.map((own, k) => sticks(own, data.solutions[k], poses[0]));
   const keys = numbered.map((at) => at.map((value) => value.toFixed(2)).join());
@@ -132,23 +132,23 @@ function draw() {
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
-    const way = motion.trails[0].filter((_, i) => motion.times[i] >= from - ROUNDED && motion.times[i] <= until + ROUNDED);
-    if (status !== "plain" && way.length > 1) space.line(way, data.colours[status], 5);
+    if (status === "plain" || from >= Math.min(until, end())) continue;
+    const times = [from, ...motion.times.filter((time) => time > from && time < until), Math.min(until, end())];
+    space.line(times.map((time) => column(posesOf(arms[0], valuesAt(motion.times, motion.values[0], time)).at(-1), 3)), data.colours[status], 5);
   }
-  for (const T of poses.map((own) => own.at(-1))) {
-    const origin = column(T, 3);
-    for (const c of [0, 1, 2]) space.line([origin, add(origin, scaled(column(T, c), 0.09 * data.size))], data.axes[c], 3);
-  }
+  const axes = poses.flatMap((own) => [0, 1, 2].map((c) => [column(own.at(-1), 3), add(column(own.at(-1), 3), scaled(column(own.at(-1), c), 0.09 * data.size))]));
+  axes.forEach((axis, i) => space.line(axis, data.axes[i % 3], 3));
   const worst = GRAVEST.find((status) => now.some((event) => event.status === status)); // what comes with it is not named
   for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j]);
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
-  space.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
+  space.keepClear([...axes.flatMap(([a, b]) => [b, scaled(add(a, b), 0.5)]), motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) {
-    const css = touching.size ? page.touching : page.ink;
+    const css = touching.size || wrong ? page.touching : page.ink;
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
-    else space.line([from, to], ...(text ? [page.ink, 3] : [data.colours.sight, 1.5, false]));
+    else space.line([from, to], ...(text ? [css, 4] : [data.colours.sight, 1.5, false]));
+    if (text && String(from) !== String(to)) for (const end of [from, to]) space.dot(end, css, 4);
     if (text) space.word(text, scaled(add(from, to), 0.5), css);
   }
   if (motion.loads) tellLoads(poses[0]);
@@ -156,7 +156,7 @@ function draw() {
     if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
   }
   if (arms.length === 1) nameEnds(motion.trails[0]);
-  for (const { text, at } of data.signs) space.word(text, at);
+  data.signs.forEach(({ text, at }, k) => space.word(text, at, k === 0 && wrong ? page.touching : page.ink));
   space.names(surroundings, touching);
   space.end();
 }
@@ -183,10 +183,12 @@ function singularAxis(j, T) {
 function tellLoads(poses) {
   const most = Math.max(...motion.loads.flat().map(Math.abs).filter(Number.isFinite)) || 1;
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
-  valuesAt(motion.times, motion.loads, t).forEach((load, j) => {
+  const loads = valuesAt(motion.times, motion.loads, t);
+  const alone = loads.filter(Number.isFinite).length === 1; // its bar would be full
+  loads.forEach((load, j) => {
     if (Number.isNaN(load)) return;
     const felt = Math.abs(load) > 0.01 * most; // what is not is told in grey, without a bar
-    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt ? Math.abs(load) / most : null);
+    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt && !alone ? Math.abs(load) / most : null);
   });
 }
 
@@ -266,9 +268,8 @@ function newMotion() {
   Object.assign(bar, { min: String(start()), max: String(whole()), step: "any" });
   const beyond = { t: end(), until: whole(), status: "none", text: motion.events.at(-1)?.text || motion.name };
   const ticks = [...(whole() > end() ? [beyond] : []), ...motion.events].map((event) => {
-    const tick = document.createElement("button");
     const at = (value) => Math.min(100, (100 * (value - start())) / (whole() - start() || 1));
-    Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
+    const tick = Object.assign(document.createElement("button"), { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
     tick.style.left = `min(${at(event.t)}%, 100% - 0.6rem)`; // what is at the end is seen too
     tick.style.width = `${Math.max(0, at(event.until) - at(event.t))}%`;
     tick.addEventListener("click", () => goTo(null, event.t));
@@ -281,8 +282,7 @@ function newMotion() {
 function withCursors(figure) {
   const image = figure.querySelector("img");
   const panels = JSON.parse(figure.dataset.panels).map(([left, bottom, right, top, t0, t1, name = figure.dataset.play]) => {
-    const cursor = document.createElement("span");
-    cursor.className = "cursor";
+    const cursor = Object.assign(document.createElement("span"), { className: "cursor" });
     figure.append(cursor);
     return { left, bottom, right, top, t0, t1, name, cursor };
   });

@@ -9,6 +9,8 @@ import three from "er3a/three";
 
 const STEPS = 65535; // that the box is divided into
 const FLOOR = 14; // lines of the floor, along what is seen
+const NEAR = 0.8; // of the distance that all is seen from: where a tray is
+const SPARSE = 20; // one of so many points of a void keeps words off it
 const THROUGH = { transparent: true, depthWrite: false, side: three.DoubleSide };
 
 const place = document.getElementById("turning");
@@ -28,18 +30,20 @@ const whole = space.distance;
 Object.assign(space, { azimuth: data.azimuth, elevation: data.elevation });
 
 const all = [...layers, ...solids];
-const named = (name) => all.find(({ address }) => address && address === name);
-const chosen = () => named(location.hash.slice(1)) ?? named("tray-1");
+const chosen = () => all.find(({ address }) => address && address === location.hash.slice(1));
+const first = all.find(({ address }) => address === "tray-1");
 
-/** The middle of a layer, or the top of solids. */
+/** The highest point of a layer, or the top of solids. */
 function placeOf({ points, shapes }) {
-  return points ? scaled(points.reduce(add), 1 / points.length) : add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
+  return points ? points.reduce((a, b) => (b[2] > a[2] ? b : a)) : add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
 }
 
-/** Turns the picture until what the address names is before the rest; all stays in sight. */
+/** Turns the picture until what the address names is before the rest; a tray with the arm in it, from its side, a void without what is around. */
 function face() {
-  const [x, y] = subtract(placeOf(chosen()), middle);
-  Object.assign(space, { azimuth: Math.hypot(x, y) < 0.1 * size[0] ? data.azimuth : Math.atan2(y, x) + 0.35, distance: whole, elevation: 0.35 });
+  const at = placeOf(chosen());
+  const [[x, y], near] = [subtract(at, middle), Boolean(chosen().shapes)];
+  const about = Math.hypot(x, y) < 0.1 * size[0]; // axis 1
+  Object.assign(space, { azimuth: about ? data.azimuth : Math.atan2(y, x) + (near ? 0.9 : 0.35), elevation: 0.35, distance: (near || about ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
   refresh();
 }
 
@@ -65,8 +69,7 @@ function made(layer) {
 function cloud({ colour, cut }, points) {
   const geometry = new three.BufferGeometry();
   geometry.setAttribute("position", new three.Float32BufferAttribute(points.flat(), 3));
-  const look = { color: colour, size: 2, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] };
-  return [new three.Points(geometry, new three.PointsMaterial(look))];
+  return [new three.Points(geometry, new three.PointsMaterial({ color: colour, size: 2, sizeAttenuation: false, clippingPlanes: cut ? [plane] : [] }))];
 }
 
 /** A closed surface; where it is cut, its sides count up and down in the stencil, and a sheet fills what is between them. */
@@ -82,10 +85,10 @@ function body({ faces, colour, cut }, points) {
     return new three.Mesh(geometry, new three.MeshStandardMaterial(counted));
   });
   const filled = { stencilWrite: true, stencilFunc: three.NotEqualStencilFunc, stencilZPass: three.ReplaceStencilOp };
-  const sheet = new three.Mesh(new three.PlaneGeometry(2 * Math.max(...size), 2 * Math.max(...size)), new three.MeshStandardMaterial({ ...look, ...filled, opacity: 0.4 }));
+  const sheet = new three.Mesh(new three.PlaneGeometry(2 * Math.max(...size), 2 * Math.max(...size)), new three.MeshStandardMaterial({ ...look, ...filled, opacity: 0.5, emissive: colour, emissiveIntensity: 0.35 }));
   sheet.geometry.rotateX(Math.PI / 2);
   sheet.onBeforeRender = () => sheet.position.set(middle[0], -plane.constant, middle[2]);
-  const shell = new three.Mesh(geometry, new three.MeshStandardMaterial({ ...look, clippingPlanes, opacity: 0.3 }));
+  const shell = new three.Mesh(geometry, new three.MeshStandardMaterial({ ...look, clippingPlanes, opacity: 0.22 }));
   [...sides, shell, sheet].forEach((part, k) => (part.renderOrder = k + 1));
   return [...sides, shell, sheet];
 }
@@ -95,27 +98,34 @@ function draw() {
   plane.constant = -low[1] - Number(knife.value) * size[1];
   space.begin();
   space.floor(middle, size[0] / FLOOR, data.floor);
-  const shown = chosen();
-  for (const { name, parts } of all) for (const part of parts) part.visible = !left.has(name);
-  for (const each of solids.filter(({ name }) => !left.has(name))) {
-    const hiding = each.poses.length === 1 ? space.hiding(each.parts, solids[0].poses) : new Set();
-    space.place(each.parts, each.poses, new Map(), (part) => each !== shown && (each.address !== "" || hiding.has(part)));
+  const [shown, near] = [chosen(), chosen()?.shapes];
+  const isSeen = (each) => !left.has(each.name) && (each === solids[0] || (each.shapes ? !shown?.points && (!each.address || each === (near ? shown : first)) : !near));
+  const arm = near && shown.reached.length ? shown.reached : solids[0].poses;
+  for (const each of all) for (const part of each.parts) part.visible = isSeen(each);
+  for (const each of solids.filter(isSeen)) {
+    const hiding = each === solids[0] ? new Set() : space.hiding(each.parts, arm);
+    space.place(each.parts, each === solids[0] ? arm : each.poses, new Map(), (part) => each !== shown && hiding.has(part));
   }
-  if (shown && !left.has(shown.name)) {
-    space.keepClear([...alongArm(solids[0].poses), ...(shown.points ?? [placeOf(shown)])], ARM * size[0]);
-    space.word(shown.name, placeOf(shown), space.page.accent);
+  const named = all.filter((each) => each.address && isSeen(each));
+  space.keepClear(alongArm(arm), ARM * size[0]);
+  for (const each of named) space.keepClear(each.points?.filter((_, i) => i % SPARSE === 0) ?? [placeOf(each)], each.points ? 0 : ARM * size[0]);
+  for (const [from, to, text] of near ? shown.ways : solids[0].ways) {
+    space.line([from, to], space.page.accent, 3);
+    space.keepClear([...Array(21).keys()].map((i) => add(scaled(from, 1 - i / 20), scaled(to, i / 20))), 0);
+    space.word(text, add(scaled(from, 0.4), scaled(to, 0.6)), space.page.accent);
   }
+  for (const each of named) space.word(each.name, placeOf(each), each === shown ? space.page.accent : space.page.ink);
+  for (const each of solids.slice(1).filter((each) => !each.address && isSeen(each))) space.names(each.parts);
   space.end();
   place.toggleAttribute("data-drawn", true);
 }
 
-// The names of what is seen, each with its colour and a box to leave it out.
-for (const { name, colour } of all) {
+// What no list of the page names, each with its colour and a box to leave it out.
+for (const { name, colour } of all.filter(({ address }) => !address)) {
   const [label, check, swatch] = ["label", "input", "i"].map((tag) => document.createElement(tag));
   Object.assign(check, { type: "checkbox", checked: !left.has(name) });
   check.addEventListener("change", () => {
-    if (check.checked) left.delete(name);
-    else left.add(name);
+    left[check.checked ? "delete" : "add"](name);
     refresh();
   });
   swatch.style.background = colour;
@@ -124,6 +134,6 @@ for (const { name, colour } of all) {
 }
 
 knife.addEventListener("input", refresh);
-addEventListener("hashchange", () => named(location.hash.slice(1)) && face());
-refresh();
+addEventListener("hashchange", () => chosen() && face());
+(chosen() ? face : refresh)();
 performance.mark("turning");

@@ -16,7 +16,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.viewing.drawn import SCENE_COLOUR, drawn_arm, drawn_scene, poses_at
 from er3a.pipeline.viewing.page import page_environment
-from er3a.pipeline.viewing.palette import BODY, rgb
+from er3a.pipeline.viewing.palette import BODY
 from er3a.pipeline.viewing.still import Still
 from er3a.robots.robot import Robot
 
@@ -50,7 +50,11 @@ class Layer:
 class Solids:
     """Shapes of ``viewing/drawn.py`` under one name, which can be left out: an arm in one pose, or a scene.
 
-    ``poses`` : (k, 4, 4), of the frames that the shapes are in, m
+    Attributes
+    ----------
+    poses : (k, 4, 4), of the frames that the shapes are in, m
+    reached : the arm's poses (m + 2, 4, 4) that show how it serves them; none for those of the first solids
+    ways : dimensions from point to point (3,), m, with a word each, shown with the shapes
     """
 
     name: str
@@ -58,19 +62,21 @@ class Solids:
     poses: Reals
     colour: str
     address: str = ""
+    reached: Sequence[Any] = ()
+    ways: Sequence[tuple[Sequence[float], Sequence[float], str]] = ()
 
 
-def surroundings(robot: Robot, scene: Scene | None) -> list[Solids]:
-    """The arm with all joints at 0, and what is around it."""
+def surroundings(robot: Robot, scene: Scene | None, ways: Sequence[Any]) -> list[Solids]:
+    """The arm with all joints at 0 and dimensions of its reach, and what is around it."""
     at_zero = poses_at(robot, np.zeros(robot.joints))
-    solids = [Solids(tr("arm at 0"), drawn_arm(robot)["looks"]["checked"], at_zero, BODY)]
+    solids = [Solids(tr("arm at 0"), drawn_arm(robot)["looks"]["checked"], at_zero, BODY, ways=ways)]
     if scene:
         solids.append(Solids(own_title(scene.title), drawn_scene(scene.solids, robot), np.eye(4)[None], SCENE_COLOUR))
     return solids
 
 
 AZIMUTH_DEG, ELEVATION_DEG = -65.0, 15.0  # from where a figure is seen at first
-FILLED = 0.32  # of the distance that holds the box's diagonal
+FILLED = 0.3  # of the distance that holds the box's diagonal
 
 
 def turning_figure(
@@ -124,8 +130,6 @@ def _still(layers: Sequence[Layer], solids: Sequence[Solids], data: dict[str, An
         points = layer.points_mm / 1000
         if layer.faces is not None:
             picture.surface(points, layer.faces, layer.colour, 0.3 if layer.cut else 1.0)
-        else:
-            picture.points(points, np.tile(rgb(layer.colour), (len(points), 1)) / 255, 2.0)
     return picture.markup()
 
 

@@ -32,7 +32,7 @@ from er3a.pipeline.results import Provenance, input_records, is_computed, read_f
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.conditions import program_head
+from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.drawn import drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
 from er3a.pipeline.viewing.page import FOUNDATION_WORDS, render, robots_with, run_command
 from er3a.pipeline.viewing.palette import JOINTS, TOUCHING
@@ -87,12 +87,12 @@ WORDS: dict[str, Any] = {
     "no_jog_about": N_("The arm does not move: its joints cannot turn the tool about {axis} of the {frame}."),
     "jog_step": N_("A step needs a number above 0."),
     "pose_fields": [
-        N_("x in mm"),
-        N_("y in mm"),
-        N_("z in mm"),
-        N_("roll in degrees"),
-        N_("pitch in degrees"),
-        N_("yaw in degrees"),
+        N_("x (mm)"),
+        N_("y (mm)"),
+        N_("z (mm)"),
+        N_("roll (°)"),
+        N_("pitch (°)"),
+        N_("yaw (°)"),
     ],
     "pose_number": N_("“{field}” needs a number."),
     "not_reached": N_("The arm does not move: {reason}."),
@@ -138,11 +138,9 @@ WORDS: dict[str, Any] = {
         "shoulder": N_("Near the shoulder singularity: the wrist centre is {distance} from the plane of axes 1 and 2."),
     },
     "at": {
-        "wrist": N_("At the wrist singularity: axes 4 and 6 are parallel. Joint moves only."),
-        "elbow": N_("At the elbow singularity: the arm is straight or folded. Joint moves only."),
-        "shoulder": N_(
-            "At the shoulder singularity: the wrist centre is in the plane of axes 1 and 2. Joint moves only."
-        ),
+        "wrist": N_("At the wrist singularity: axes 4 and 6 parallel. Joint moves only."),
+        "elbow": N_("At the elbow singularity: arm straight or folded. Joint moves only."),
+        "shoulder": N_("Shoulder singularity: wrist centre in plane of axes 1, 2. Joint moves only."),
     },
     "near_unnamed": N_("Near a singularity: the smallest singular value is {value}."),
     "solutions": N_("All IK solutions of this pose"),
@@ -153,7 +151,7 @@ WORDS: dict[str, Any] = {
     "current": N_("the arm is here"),
     "within": N_("within the limits"),
     "within_at": N_("within the limits, {joints} at the limit"),
-    "leaves": N_("{joint} {excess} over its limit"),
+    "leaves": N_("{joint} {excess} over"),
     "separator": N_("; "),
     "above": N_("{joint} at {angle} is {excess} above its limit of {limit}"),
     "below": N_("{joint} at {angle} is {excess} below its limit of {limit}"),
@@ -168,16 +166,9 @@ WORDS: dict[str, Any] = {
         "orientation": N_("the wrist would have to tilt {gap} further than it can"),
     },
     "free": {
-        "wrist": N_(
-            "Axes 4 and 6 are collinear: J4 and J6 compensate each other, so there are infinitely many "
-            "solutions; J4 is kept here."
-        ),
-        "elbow": N_(
-            "The wrist centre is on axis 2: J2 is free, so there are infinitely many solutions; J2 is kept here."
-        ),
-        "shoulder": N_(
-            "The wrist centre is on axis 1: J1 is free, so there are infinitely many solutions; J1 is kept here."
-        ),
+        "wrist": N_("Axes 4 and 6 are collinear: infinitely many solutions; J4 is kept."),
+        "elbow": N_("The wrist centre is on axis 2: infinitely many solutions; J2 is kept."),
+        "shoulder": N_("The wrist centre is on axis 1: infinitely many solutions; J1 is kept."),
     },
     "found": N_("solution {number}"),
     "iterated": N_("{count} found by iteration; there may be others"),
@@ -226,6 +217,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         robot_pages=study.pages(name),
         first_caveat=first_caveat,
         head=program_head(validated if known else None),
+        condition=condition_of(validated) if known else "",
         command=run_command(study, f"{name}/teach.html"),
         provenance=Provenance(inputs, code_digest(), config=study.settings(name, "trajectory")),
     )
@@ -251,6 +243,7 @@ def write_panel(
     robot_pages: Sequence[str] = (),
     first_caveat: Caveat | None = None,
     head: Sequence[str] | None = None,
+    condition: str = "",
 ) -> None:
     """Write the teach panel of a robot.
 
@@ -260,7 +253,7 @@ def write_panel(
     home : (n,), rad or m, that the panel opens at; None for that of the robot's file, or else joints at 0, and those
         whose limits leave 0 out in the middle of them
     robots, robot_pages : of the study: arms with a panel (name, title, address), and this arm's other pages
-    first_caveat : what to know of its table, if anything
+    first_caveat : what to know of its table, if anything; condition : what of it has to be confirmed
     head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
@@ -287,6 +280,7 @@ def write_panel(
         words=panel["words"],
         foundation=tr(FOUNDATION_WORDS[first_caveat.status]) if first_caveat else "",
         first_caveat=first_caveat,
+        condition=condition,
         panel=panel,
         drawing_head=drawing_head([*SPACE, *sorted(_HERE.glob("*.js"))]),
         still=scene_still(panel, [poses_at(robot, opened)], {}).markup(),
@@ -328,7 +322,7 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
 def _looked_at(robot: Robot) -> tuple[list[float], float]:
     """Where the picture's eye looks, (3,), m, and about how long the arm is from there, m."""
     tool = frames(robot, (robot.lower + robot.upper) / 2)[-1, :3, 3]
-    return ((robot.base[:3, 3] + tool) / 2).tolist(), 0.75 * drawn_size(robot)
+    return ((robot.base[:3, 3] + tool) / 2).tolist(), 0.68 * drawn_size(robot)
 
 
 def singular_sets(robot: Robot) -> dict[str, Any] | None:

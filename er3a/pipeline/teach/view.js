@@ -66,9 +66,10 @@ export class ArmView extends Space {
   /** The joints' axes, each from the arm outwards in its own colour. */
   #axes(poses) {
     for (const [k, { middle, half }] of this.data.rows.entries()) {
-      const tip = add(moved(poses[k + 1], middle), scaled(column(poses[k + 1], 2), 2 * this.table.direction[k] * half));
-      this.line([moved(poses[k + 1], middle), tip], this.data.colours.joints[k], 3);
-      this.word(this.rows[k], tip);
+      const at = moved(poses[k + 1], middle);
+      const tip = add(at, scaled(column(poses[k + 1], 2), 2 * this.table.direction[k] * half));
+      this.line([at, tip], this.data.colours.joints[k], 3);
+      this.word(this.rows[k], Math.hypot(...middle) ? at : tip); // an axis along its link is in the arm
     }
   }
 

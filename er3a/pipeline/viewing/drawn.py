@@ -79,8 +79,14 @@ def poses_at(robot: Robot, q: Reals) -> Reals:
 
 
 def _checked(robot: Robot, shapes: ArmShapes) -> list[Shape]:
-    """The shapes that collisions are measured with."""
-    found = [_rod(c.link, np.array(c.start), np.array(c.end), c.radius, SHELL) for c in shapes.capsules]
+    """The shapes that collisions are measured with, without what of a base's capsule is below its plate."""
+    found = []
+    for c in shapes.capsules:
+        start, end = np.array(c.start), np.array(c.end)
+        if c.link == 0 and not start.any():
+            start = end / 2
+            found.append(_rod(0, 0 * end, start, c.radius, SHELL) | {"kind": "cylinder"})
+        found.append(_rod(c.link, start, end, c.radius, SHELL))
     found += [
         _mesh(each.link, *simplified(each.points, each.faces, MAX_FACES // len(shapes.meshes)))
         for each in shapes.meshes
@@ -103,7 +109,7 @@ def _rest(robot: Robot, shaped: set[int], shapes: ArmShapes | None) -> list[Shap
     found = [] if 0 in shaped else [_rod(0, origin, parts[0, TO_NEXT_AXIS, :3, 3], thin, BODY)]
     if 0 not in on_capsules:
         height = PLATE_HEIGHT * size
-        place = _along(origin, np.array([0, 0, height]))
+        place = frame_between(origin, np.array([0, 0, height]))
         plate = {"radius": PLATE_RADIUS * size, "length": height, "T": place.tolist(), "colour": PLATE}
         found.append({"frame": 0, "name": link_label(0), "kind": "cylinder", **plate})
     for k in range(robot.rows):
@@ -152,12 +158,12 @@ def _rail(robot: Robot, parts: Reals, k: int, radius: float) -> Shape:
 
 def _rod(frame: int, start: Reals, end: Reals, radius: float, colour: str) -> Shape:
     """A capsule between two points (3,), m, in a frame."""
-    T = _along(start, end)
+    T = frame_between(start, end)
     place = {"T": T.tolist(), "radius": float(radius), "length": float(np.linalg.norm(end - start))}
     return {"frame": frame, "name": link_label(frame), "kind": "capsule", **place, "colour": colour}
 
 
-def _along(start: Reals, end: Reals) -> Reals:
+def frame_between(start: Reals, end: Reals) -> Reals:
     """A frame (4, 4) midway between two points, m, with z from the first to the second."""
     T = np.eye(4)
     T[:3, 3] = (start + end) / 2
@@ -209,7 +215,7 @@ def _measures(solid: Solid, robot: Robot) -> Shape:
             return {"kind": "sphere", "T": np.asarray(solid.T).tolist(), "radius": solid.radius}
         case Plane():
             top = robot.base[:3, 3] - (solid.normal @ robot.base[:3, 3] - solid.offset) * solid.normal
-            T = _along(top - 2 * PLANE_THICKNESS * solid.normal, top - PLANE_THICKNESS * solid.normal)
+            T = frame_between(top - 2 * PLANE_THICKNESS * solid.normal, top - PLANE_THICKNESS * solid.normal)
             size = [PLANE_SIZE * drawn_size(robot)] * 2 + [PLANE_THICKNESS]
             return {"kind": "box", "T": T.tolist(), "size": size, "pale": True, "colour": GRID}
         case Mesh():

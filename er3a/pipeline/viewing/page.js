@@ -92,25 +92,19 @@ function nameFor(element) {
 }
 
 function download(text, type, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text], { type }));
-  link.download = name;
+  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob([text], { type })), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
 function toolButton(label, action) {
-  const button = document.createElement("button");
-  button.type = "button";
-  button.className = "tool";
-  button.textContent = label;
+  const button = Object.assign(document.createElement("button"), { type: "button", className: "tool", textContent: label });
   button.addEventListener("click", action);
   return button;
 }
 
 function enlarge(image) {
-  const dialog = document.createElement("dialog");
-  Object.assign(dialog, { className: "enlarged", ariaLabel: image.alt, closedBy: "any" });
+  const dialog = Object.assign(document.createElement("dialog"), { className: "enlarged", ariaLabel: image.alt, closedBy: "any" });
   const close = toolButton(WORDS.close, () => dialog.close());
   const large = image.cloneNode();
   dialog.append(close, large);
@@ -264,9 +258,7 @@ function answer(image) {
 
 // The pointer, or a finger, asks a figure; the lines that it answers stand beside it.
 function answerPointer(image, linesAt) {
-  const box = document.createElement("div");
-  box.className = "reading";
-  box.hidden = true;
+  const box = Object.assign(document.createElement("div"), { className: "reading", hidden: true });
   image.after(box);
   const ask = (event) => {
     const lines = linesAt(event);
@@ -415,9 +407,7 @@ function addFinder() {
     const count = here + away;
     status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : document.getElementById("places") ? WORDS.noneAnywhere : WORDS.none;
     if (here && away) {
-      const below = document.createElement("a");
-      below.href = "#elsewhere";
-      below.textContent = WORDS.elsewhere.replace("{count}", away);
+      const below = Object.assign(document.createElement("a"), { href: "#elsewhere", textContent: WORDS.elsewhere.replace("{count}", away) });
       status.append(" · ", below);
     }
     if (count) keepWarnings(main);

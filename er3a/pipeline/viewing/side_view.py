@@ -21,7 +21,7 @@ Kind = Literal["right", "wrong"]
 LabelKind = Literal["wrong", "open", "hole", "right", "sound", "floor"]
 MARGIN = 0.06  # of the larger side
 UPRIGHT = 0.83  # width of a drawing, of its height
-LABEL, SCALE = 0.38, 0.05  # of the height: room for labels at the right, for the scale below
+LABEL, SCALE = 0.24, 0.05  # of the height: room for labels at the right, for the scale below
 LETTERS = 0.021  # of the height: of a line's word
 SIDES = np.array(
     [(0, 1.4), (1.9, 0), (0, -1.4)]
@@ -174,7 +174,8 @@ def side_view(
     tall = float(high[1] - low[1])
     low[1] -= SCALE * tall
     for label in labels:
-        high[0] = max(high[0], _across(label, column_mm) + LABEL * tall)
+        across = _across(label, column_mm)
+        high[0] = max(high[0], across + LABEL * max(tall, (across - low[0]) / (ratio - LABEL)))
     wide, tall = high - low
     spare = np.maximum(0.0, [ratio * tall - wide, wide / ratio - tall]) / 2
     low, high = low - spare, high + spare
@@ -244,7 +245,9 @@ def _across(label: Label, column_mm: float | None) -> float:
 
 
 def _lead(label: Label, place: Reals) -> Markup:
-    """The line of a label: to its place, or where it has a start from there."""
+    """The line of a label: from its start, or to where it is written if that is not its place."""
+    if label.start is None and place[0] == label.at[0]:
+        return Markup("")
     start, dashed = (label.at, "") if label.start is None else (label.start, "dashed")
     line = _line(np.stack([start, label.at, place]))
     return Markup('<polyline class="lead {} {}" points="{}"/>').format(label.kind, dashed, line)

@@ -16,12 +16,10 @@ const PALE = 0.36;
 const SMALL = 0.12; // radius of a body that its name would hide, in parts of what is seen
 const HIDDEN = 0.22; // of a line, where a body is before it
 const CREASE = 0.7; // rad between two faces: less is drawn as one that is curved
-const WIDE = 3; // a word, in its heights, about
-// Where a word may be, in its widths and heights from its point, the nearest place first.
-const PLACES = [-1.5, -1, -0.5, 0, 0.5, 1, 1.5]
-  .flatMap((i) => [-6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6].map((j) => [i, j]))
-  .sort((a, b) => Math.hypot(WIDE * a[0], a[1]) - Math.hypot(WIDE * b[0], b[1]));
+// Where a word may be, in its widths and heights from its point.
+const PLACES = [0, -0.5, 0.5, -1, 1, -1.5, 1.5, -2, 2, -2.5, 2.5].flatMap((i) => [0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6].map((j) => [i, j]));
 const NEAR = 3.2; // heights: a word that is not needed is no farther from its point
+const WIDE = 3; // heights that a step sideways counts for, at most
 const WORD = 0.85; // height of words, in letters of the page
 export const ARM = 0.05; // about half the width of an arm, in parts of its size: words keep off it
 const SIDES = 1.2; // a picture that is less wide, of its height, is filled on its sides
@@ -220,8 +218,9 @@ export class Space extends Orbit {
     pen.font = `600 ${size}px system-ui, sans-serif`;
     const [x, y] = this.seen(point);
     const [width, height] = [pen.measureText(text).width + 0.5 * size, (share === null ? 1.25 : 2.2) * size];
-    const places = PLACES.filter(([i, j]) => needed || Math.hypot(WIDE * i, j) < NEAR).map(([i, j]) => [x + i * width, y + j * height]);
-    const seen = ([u, v]) => Math.min(u, this.width - u) > width / 2 && Math.min(v, this.height - v) > height / 2;
+    const far = ([i, j]) => Math.hypot(Math.min(WIDE, width / height) * i, j);
+    const places = PLACES.filter((place) => needed || far(place) < NEAR).sort((a, b) => far(a) - far(b)).map(([i, j]) => [x + i * width, y + j * height]);
+    const seen = ([u, v]) => Math.min(u, this.width - u) > width / 2 + size && Math.min(v, this.height - v) > height / 2;
     const apart = ([u, v]) => this.taken.every(([a, b, w, h]) => Math.abs(u - a) > (width + w) / 2 || Math.abs(v - b) > (height + h) / 2);
     const free = places.find((place) => seen(place) && apart(place));
     if (!free && !needed) return;

@@ -110,14 +110,6 @@ class Still:
         shades = np.tile([*np.array(rgb(colour)) / 255, 1.0], (len(triangles), 1))
         paint(triangles, shades, *self.bodies)
 
-    def points(self, points: Reals, colours: Reals, width: float) -> None:
-        """Squares at points (N, 3), ``width`` px wide; colours (N, 3), 0 to 1."""
-        half = 0.5 * width * FINE
-        corners = self.seen(points)[:, None] + [[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]]
-        shades = np.column_stack([colours, np.ones(len(colours))])
-        for three in ([0, 1, 2], [0, 2, 3]):
-            paint(corners[:, three], shades, *self.bodies)
-
     def grid(self, centre: Reals, step: float) -> None:
         """A square floor around a point, at the height that shadows fall to."""
         half = GRID_STEPS * step

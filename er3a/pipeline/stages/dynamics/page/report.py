@@ -26,7 +26,7 @@ from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
-TALL = 4.3  # inches, of figures at the side of the player
+TALL = 5.4  # inches, of figures at the side of the player
 KEY: dict[str, Any] = {
     "fontsize": 10,
     "handlelength": 1.2,
@@ -56,8 +56,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     torque.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
     caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
-    alt = tr("Torques over time for {path}.", path=path.name)
-    return Picture(figure, alt, caption, [(torque, path.name)])
+    return Picture(figure, caption, caption, [(torque, path.name)])
 
 
 def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.HoldingTorque) -> Picture | None:
@@ -156,39 +155,38 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
-    loads = [load for path in summary.paths if path.counts for load in path.joints]
-    rows, idle = [], []
+    rows = []
     for motor in order:
-        if not limited and motor.unit == worst.unit and motor.peak < SEEN * longest:
-            idle.append(motor.joint)
-            continue
         moment = _moment_of(results, motor)
-        name = joined([f"J{motor.joint}", moment[0]], ", ")
-        off = max(load.tolerance for load in loads if load.joint == motor.joint and load.peak == motor.peak)
-        rows.append(_row(motor, (motor.peak, off), name, moment, longest, motor.peak_limit))
-    if idle:
-        most = at_most(max(load.peak + load.tolerance for load in loads if load.joint in idle), 1)
-        names = joined((f"J{joint}" for joint in sorted(idle)), ", ")
-        rows.append(ListRow("none", names, with_unit(f"≤ {most}", worst.unit), "#motors"))
+        off = max(
+            load.tolerance
+            for path in summary.paths
+            for load in path.joints
+            if path.counts and load.joint == motor.joint and load.peak == motor.peak
+        )
+        rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {moment[0]}", moment, longest, motor.peak_limit))
     still = [
         _row(
             motor, (motor.holding, held.tolerance), holding_name(motor.joint), (holding_name(motor.joint), 0.0), longest
         )
         for motor in order
         for held in summary.holding
-        if held.joint == motor.joint and motor.holding >= SEEN * longest
+        if held.joint == motor.joint
     ]
     left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
     return Answer(
         headline,
         "" if limited or over else tr("Motor limits are missing."),
-        tr("At least: without {parts}.", parts=joined(left, ", ")) if left else "",
+        tr("Lower bounds: {parts} are missing.", parts=joined(left, ", ")) if left else "",
         [
             (moving, tr("J{joint} moving", joint=worst.joint)),
             (holding, tr("J{joint} holding", joint=worst.joint)),
             payload,
         ],
-        (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
+        [
+            Group(title, [row for row in found if row.length >= SEEN])
+            for title, found in ((tr("Greatest torque on the paths"), rows), (tr("Holding, in the worst pose"), still))
+        ],
         None if limited else Fix(tr("enter the motors' peak torques."), "#motors", False),
     )
 

@@ -20,7 +20,7 @@ KEY: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderax
 OFF = 0.005  # mm or deg, from which on a repair counts as off the path
 
 
-def path_picture(path: model.PathSummary, rows: model.PathChecks, alt: str, caption: str) -> Picture:
+def path_picture(path: model.PathSummary, rows: model.PathChecks, caption: str) -> Picture:
     """Angles and velocities of a path's joints over one time, as many rows as the curves need."""
     figure, axes = new_figure(rows=2, width=9.6, height=5.2, sharex=True)
     for ax, name in zip(axes, ("q_deg", "q_deg_s")):
@@ -37,7 +37,7 @@ def path_picture(path: model.PathSummary, rows: model.PathChecks, alt: str, capt
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
     axes[0].legend(ncols=10, loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0.1)
     axes[1].set_xlabel(axis_label(rows, "t_s"))
-    return Picture(figure, alt, caption, [(ax, path.name) for ax in axes])
+    return Picture(figure, caption, caption, [(ax, path.name) for ax in axes])
 
 
 def nearness_picture(
@@ -65,9 +65,9 @@ def nearness_picture(
         text = tr("assumed shapes may be off by {mm:g} mm", mm=margin)
         ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.25, linewidth=0, label=text)
         ax.legend(**KEY)
-    far, at = fixed(least.least_mm, 1), fixed(least.t_s, 2)
     ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
-    caption = tr("Least: {far} mm at {t} s, {pair}.", far=far, t=at, pair=say(least.between))
+    far = fixed(least.least_mm, 1)
+    caption = tr("Least: {far} mm at {t:.2f} s, {pair}.", far=far, t=least.t_s, pair=say(least.between))
     ax.set_xlim(0.0, rows.t_s[-1])
     ax.set_xlabel(axis_label(rows, "t_s"))
     ax.set_ylabel(axis_label(rows, "clearance_mm"))

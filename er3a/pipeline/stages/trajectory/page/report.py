@@ -8,12 +8,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from markupsafe import Markup
 
-from er3a.comparison.compare import shift_between
-from er3a.geometry.transforms import translation
-from er3a.kinematics.forward import forward
-from er3a.pipeline.language import own_title, tr, using, with_unit
+from er3a.pipeline.language import tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
@@ -33,6 +29,7 @@ from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.page.path_figures import fault_picture, nearness_picture, path_picture
 from er3a.pipeline.stages.trajectory.page.played import (
+    both_arms,
     faults,
     motions,
     near_assumed,
@@ -45,14 +42,12 @@ from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, ListRow, judged, may_run
 from er3a.pipeline.viewing.conditions import program_head
-from er3a.pipeline.viewing.page import Picture, alternative_table, packed_text, render_stage, whole_sentence
+from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
-from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
 Rows = TypeVar("Rows", bound=model.MotionRows)
-DISTANCE = 0.6  # of an arm's size, between two
 DRAWN = 250  # points of a curve
 MAX_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
 
@@ -74,7 +69,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count))
         links = _programs(path, files, lines, met or {})
-        drawn = _figure(path, rows) if i < count else None
+        drawn = path_picture(path, _drawn(path, rows), whole_sentence(path_text(path))) if i < count else None
         over_time = _over_time(path, results) if i < count else []
         sections.append({**_section(path, drawn, links, summary), "over_time": over_time})
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
@@ -90,27 +85,9 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
         drawn_paths=count,
-        player=_both_arms(study, stored, played)
-        if contradicted
-        else player(robot, played, scene, opened=opened(wrong.values())),
+        player=both_arms(study, stored, played) or player(robot, played, scene, opened=opened(wrong.values())),
         drawing_head=drawing_head(),
     )
-
-
-def _both_arms(study: Study, stored: Stored[model.TrajectoryResults], played: Sequence[PlayedMotion]) -> Markup:
-    """An arm whose table evidence contradicts beside that of the table to use instead, at the same joint values."""
-    robot, instead = study.robot(stored.robot), alternative_table(study, stored)
-    right = study.robot(instead) if instead else robot
-    if right is robot or right.joints != robot.joints:
-        return player(robot, played)
-    other = right.replace(base=translation(0.0, -DISTANCE * size_of(robot), 0.0) @ right.base)
-    motions = []
-    for motion in played:
-        off = shift_between(forward(robot, motion.q), forward(right, motion.q))
-        far = fixed(1000 * float(off.max()), 0)
-        text = tr("The same joint angles put the tool up to {far} mm off.", far=far)
-        motions.append(replace(motion, text=text, beside=(motion.q,)))
-    return player(robot, motions, beside=(other,), signs=[own_title(each.title) for each in (robot, other)])
 
 
 def paths_answer(robot: Robot, results: model.TrajectoryResults) -> Answer:
@@ -220,16 +197,6 @@ def _clear_of(path: model.PathSummary) -> str:
 
 def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
     return bool(program["file"].rpartition(".")[0] == repair_name(path.name))
-
-
-def _figure(path: model.PathSummary, rows: model.PathChecks) -> Picture:
-    text = path_text(path)
-    alt = tr(
-        "Joint angles and velocities over time for {path}. {finding}.",
-        path=path.name,
-        finding=text,
-    )
-    return path_picture(path, _drawn(path, rows), alt, whole_sentence(text))
 
 
 def _over_time(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:

@@ -114,7 +114,7 @@ def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
         )
         worst = max(own, key=lambda each: (each.off.mm, each.off.deg), default=None)
         if own or evidence is None:
-            off = _tool_off(worst) if worst and worst.off.moves else ""
+            off = _tool_off(worst) if worst and worst.off.moves else tr("may hit a stop") if worst else ""
             rows.append(ListRow("caution", tr(text, names=named), off, f"#{place}"))
     return rows
 

@@ -168,7 +168,7 @@ def _both_arms(
     q = np.zeros(robot.joints)
     for each in disputed[:1]:
         q = search(robot, AxisDistance(**each.subject.params), REACH_STARTS)[1]
-    arms = [seen_arm(robot, tr("This table"), tr("stretched") if disputed else "", q=q)]
+    arms = [seen_arm(robot, tr("This table"), tr("stretched out") if disputed else "", q=q)]
     if other is not None:
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), q=q))
     off = flanges_off(arms)

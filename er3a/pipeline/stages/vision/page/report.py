@@ -182,11 +182,11 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
         made = (
             tr("error at the grasp, 95 %, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
         )
-        value, allowed = fixed(worst[0].together, 1), with_unit(f"{limit:g}", "mm")
-        keys = [(tr("{value} of {limit}", value=value, limit=allowed), made)]
-    elif found:
-        half = max(found.hand_eye.half_width_mm)
-        keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
+        keys = [(with_unit(f"{fixed(worst[0].together, 1)} / {limit:g}", "mm"), made)]
+    if found:
+        half = fixed(max(found.hand_eye.half_width_mm), 2)
+        place = f"{_listed(found.hand_eye.xyz_mm, 0)} ± {half}"
+        keys.insert(0, (with_unit(place, "mm"), tr("camera's place, 95 %")))
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [
         Group(tr("Can't be grasped"), [row for row in shown if row.mark == "fail"]),

@@ -147,7 +147,6 @@ def capability_context(
         "asked_text": _asked_text(capability),
         "capability_picture": _picture(robot, results, capability) if len(results.capability) else None,
         "task_text": _task_text(placement.task, capability),
-        "tray_places": placing.rows if placing else [],
         "tray_rows": tray_rows(placing, results, placement, payload)
         if placing and isinstance(placement, model.PlacementSummary)
         else [],
@@ -166,29 +165,14 @@ def _placement_context(placement: model.Placement) -> dict[str, Any]:
 
 def _picture(robot: Robot, results: model.WorkspaceResults, capability: model.CapabilitySummary) -> Picture:
     """Slices of what the tool can do."""
-    title = (
-        tr("Slices across the slide of joint 1: reachability, IK solutions, manipulability")
-        if capability.bar_m
-        else tr("Slices through axis 1: reachability, IK solutions, manipulability")
-    )
-    return Picture(upright_slices(robot, capability, results.capability), title, _slices_caption(capability))
-
-
-def _slices_caption(capability: model.CapabilitySummary) -> str:
     overall = capability.overall
-    numbers = {
-        "mean": number(100 * overall.mean_reachability, 2),
-        "best": number(100 * overall.best_reachability, 3),
-        "solutions": number(overall.mean_solutions, 2),
-        "most": overall.most_solutions,
-    }
-    first = tr(
-        "A reached cell offers {mean} % of the orientations asked on average, the best one {best} %, each with "
-        "{solutions} IK solutions on average (of {most} at most).",
-        **numbers,
+    caption = tr(
+        "A reached cell offers {mean} % of the orientations asked on average, the best one {best} %. Plan work where "
+        "all three are high; rims are reached only with the arm stretched, folded or twisted.",
+        mean=number(100 * overall.mean_reachability, 2),
+        best=number(100 * overall.best_reachability, 3),
     )
-    plan = tr("Plan work where all three are high; rims are reached only with the arm stretched, folded or twisted.")
-    return joined([first, plan], " ")
+    return Picture(upright_slices(robot, capability, results.capability), caption, caption)
 
 
 def _asked_text(capability: model.CapabilitySummary) -> str:
@@ -267,17 +251,10 @@ def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> 
             **shown,
         ),
     }[capability.asked]
-    lowest, clear = fixed(task.lowest_mm, 0), fixed(task.clear_of_axis_mm, 0)
-    if capability.bar_m:
-        stands = tr(
-            "The tray is level, as given or rotated by 90°, with its underside at {lowest} mm or higher.",
-            lowest=lowest,
-        )
-    else:
-        stands = tr(
-            "The tray is level, as given or rotated by 90°, with its underside at {lowest} mm or higher, at least "
-            "{clear} mm from axis 1.",
-            lowest=lowest,
-            clear=clear,
-        )
-    return joined([served, stands], " ")
+    level = tr(
+        "The tray is level, as given or rotated by 90°, with its underside at {lowest} mm or higher.",
+        lowest=fixed(task.lowest_mm, 0),
+    )
+    if not capability.bar_m:
+        level = joined([level, tr("It keeps {clear} mm from axis 1.", clear=fixed(task.clear_of_axis_mm, 0))], " ")
+    return joined([served, level], " ")

@@ -43,7 +43,6 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         output,
         _answer(summary, placing, [] if known else [payload_key(known, robot)]),
         labelled=_labelled(study, stored, contradicted),
-        at_side=contradicted,
         turning=workspace_figures.in_space(robot, results, scene, trays),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
@@ -69,9 +68,10 @@ def _labelled(study: Study, stored: Stored[model.WorkspaceResults], contradicted
 def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: Sequence[tuple[str, str]]) -> Answer:
     """How far the arm reaches, its voids, where the tray goes, and the ``payload`` where no other page says it."""
     reach, volume = summary.reach_m, summary.volume_m3
-    rest, fix, best = "", None, placing.tried[0] if placing else None
-    if placing and best and not sum(map(len, placing.hindered(best).values())):
-        rest, centre = whole_sentence(tr("{tray} fits", tray=best.tray.name)), millimetres(best.tray.place.centre_m)
+    rest, fix, rows = "", None, _tray_as_rows(placing)
+    if placing and rows[0].mark == "pass":
+        tray = placing.tray
+        rest, centre = whole_sentence(tr("{tray} fits", tray=tray.name)), millimetres(tray.place.centre_m)
         fix = Fix(tr("add the tray and its stand to the scene at {centre} mm.", centre=centre), "#tray-1", False)
     keys = [
         (
@@ -87,7 +87,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
     # The void that the picture shows comes first.
     voids = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     groups = (
-        Group(tr("Where the tray goes"), _tray_as_rows(placing)),
+        Group(tr("Where the tray goes"), rows),
         Group(tr("Where the tool can't go"), [_void_as_row(*each) for each in voids]),
     )
     return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups, fix)

@@ -17,7 +17,6 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import as_text, own_title, tr
-from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import bracketed, joined
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.messages.workspace import millimetres
@@ -32,7 +31,7 @@ from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.page.played import faults as path_faults
 from er3a.pipeline.stages.trajectory.page.played import repaired
 from er3a.pipeline.stages.vision.model import ObjectResult, VisionResults
-from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
+from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary, TaskSummary
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -53,10 +52,12 @@ class Tray:
     ----------
     place : of the tray
     below : the surface that it stands on or over, None in open space
+    task : what the tool does there
     """
 
     place: PlaceSummary
     below: StandSummary | None
+    task: TaskSummary
 
     @property
     def low(self) -> Reals:
@@ -159,10 +160,13 @@ def trays(workspace: Any) -> list[Tray]:
     placement = getattr(workspace.summary, "placement", None)
     if not isinstance(placement, PlacementSummary) or not placement.named_places:
         return []
-    best = placement.best
+    best, task = placement.best, placement.task
     below = placement.over if placement.stand is None else placement.stand
     standing = [(stand.place or stand.above, stand) for stand in placement.stands]
-    return [Tray(best, below), *(Tray(place, stand) for place, stand in standing if place and place != best)]
+    return [
+        Tray(best, below, task),
+        *(Tray(place, stand, task) for place, stand in standing if place and place != best),
+    ]
 
 
 def stored_motions(results: object, robot: Robot) -> Iterator[StoredMotion]:
@@ -262,18 +266,10 @@ class Placing:
             return tr("no motion passes that it could be in the way of")
         if not some:
             return tr(
-                "in the way of none of the {count} motions that pass without it ({parts}); nothing was planned around "
-                "it",
+                "in the way of none of the {count} motions that pass without it; nothing was planned around it",
                 count=self.passing,
-                parts=self._parts,
             )
         return tr("in the way of {some} of the {count} motions that pass without it", some=some, count=self.passing)
-
-    @property
-    def _parts(self) -> str:
-        """Of how many paths, programs and grasps the motions that pass are made up."""
-        counts = [(len(self.sound.get(stage, ())), tr(MOTIONS[stage])) for stage in self.met]
-        return joined([tr("{count} {what}", count=count, what=what) for count, what in counts if count], ", ")
 
     @property
     def compared(self) -> str:
@@ -286,36 +282,6 @@ class Placing:
         if self.unseen:
             said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
         return joined(said, " ")
-
-    @property
-    def rows(self) -> list[list[str]]:
-        """Each place as a row: where, centre, edges, what it is in the way of, margins."""
-        return [
-            [
-                each.tray.where,
-                millimetres(each.tray.place.centre_m),
-                each.tray.edges,
-                self._counted(each),
-                limit_text(each.tray.place),
-                fixed(each.tray.place.clearance_mm, 0),
-            ]
-            for each in self.tried
-        ]
-
-    def _counted(self, tried: Tried) -> str:
-        hindered = self.hindered(tried)
-        counts = [
-            tr("{some} of {count} {what}", some=len(hindered.get(stage, ())), count=len(names), what=tr(MOTIONS[stage]))
-            for stage in tried.met
-            if (names := self.sound.get(stage, ()))
-        ]
-        return joined(counts, ", ") or "–"
-
-
-def limit_text(place: PlaceSummary) -> str:
-    """How near to its limit a joint comes at a place, deg, and which."""
-    margin = fixed(place.limit_margin_deg, 1)
-    return bracketed(margin, f"J{place.limit_joint}" if place.limit_joint is not None else "")
 
 
 def placing(

@@ -10,16 +10,17 @@ from markupsafe import Markup
 from er3a.collision.scene import Scene
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import skeleton
+from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed
-from er3a.pipeline.messages.workspace import reaches
+from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.turning import Layer, Solids, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
-from er3a.pipeline.viewing.drawn import drawn_scene, floor_of
+from er3a.pipeline.viewing.drawn import drawn_scene, floor_of, frame_between, poses_at
 from er3a.pipeline.viewing.palette import VERDICTS, VOIDS
-from er3a.pipeline.viewing.side_view import UPRIGHT, DrawnLine, Kind, Label, SeenArm, border_lines, dimension, side_view
+from er3a.pipeline.viewing.side_view import DrawnLine, Kind, Label, SeenArm, border_lines, dimension, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
@@ -27,6 +28,8 @@ from er3a.workspace.voids import mesh as surface_of
 
 REACHED = "#9ecae1"
 ASIDE = (0.12, 0.28)  # of the reach, from a void before axis 1 to its name
+WIDE = 1.7  # width of the figure of two arms, of its height
+AHEAD = np.array([1.0, 0.0, 0.0])  # of the arm at zero
 BELOW = 0.08  # of the reach, from what is reached down to its dimension
 
 
@@ -83,12 +86,40 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None,
         if len(faces):
             corners = 1000 * _smoothed(vertices.point_m[vertices.void == i], faces)
             layers.append(Layer(void_name(i, void), corners, VOIDS[void.kind], faces=faces, address=f"hole-{i}"))
-    solids = surroundings(robot, scene)
+    border, axis, ways = results.border, results.summary.axis, []
+    if not results.summary.is_flat and not results.summary.proof.bars:
+        far = border.rho_m.argmax()
+        middle = axis.point_m + border.z_m[far] * np.array(axis.direction)
+        ways = [(middle.tolist(), (middle + border.rho_m[far] * AHEAD).tolist(), reaches(results.summary))]
+    solids = surroundings(robot, scene, ways)
     for i, tray in enumerate(trays, start=1):
         colour = VERDICTS["pass" if i == 1 else "caution"]
         drawn, *stand = drawn_scene(tray.parts, robot)
-        solids.append(Solids(tray.name, [drawn | {"colour": colour}, *stand], np.eye(4)[None], colour, f"tray-{i}"))
+        parts = [drawn | {"colour": colour}, *stand]
+        shown = f"tray-{i}", _reaching_in(robot, tray), _ways(tray)
+        solids.append(Solids(tray.name, parts, np.eye(4)[None], colour, *shown))
     return turning_figure(layers, solids, results.summary.axis.point_m[1], floor_of(scene) or 0.0)
+
+
+def _reaching_in(robot: Robot, tray: Tray) -> list[Reals]:
+    """The arm's poses with its tool in the middle of a tray, in the configuration that serves it; none where that has
+    no name."""
+    centre, way = np.array(tray.place.centre_m), np.array(tray.task.tool_direction)
+    found = inverse(robot, frame_between(centre - way, centre + way))
+    q = found.q[found.within_limits & (found.label == tray.place.branch)]
+    return poses_at(robot, q[0]).tolist() if len(q) else []
+
+
+def _ways(tray: Tray) -> list[tuple[list[float], list[float], str]]:
+    """From the origin to the middle of a tray: along x and y, then up in front of the stand."""
+    steps = np.diag(tray.place.centre_m)
+    starts = np.cumsum([0 * AHEAD, *steps[:2]], axis=0)
+    starts[2] += tray.place.size_m[0] / 2 * AHEAD
+    return [
+        (start.tolist(), (start + step).tolist(), f"{axis} {with_unit(millimetres([step.sum()]), 'mm')}")
+        for start, step, axis in zip(starts, steps, "xyz")
+        if step.any()
+    ]
 
 
 def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals, Integers]:
@@ -142,7 +173,7 @@ def labelled(arms: Sequence[tuple[Robot, model.WorkspaceResults, Kind]], floor_m
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([-far / 5, below - BELOW * far]), kind))
         over += dimension(far, below, height, kind)
-    return side_view(seen, floor_mm, ratio=UPRIGHT if arms[1:] else 1.2, labels=labels, over=over)
+    return side_view(seen, floor_mm, ratio=WIDE if arms[1:] else 1.2, labels=labels, over=over)
 
 
 def litres(void: model.VoidSummary) -> str:
