@@ -64,7 +64,7 @@ ASSUMED_SLIDE_MM = 1000.0
 def read_dh_table(
     path: str | Path,
     name: str,
-    convention: Convention = "standard",
+    convention: Convention | None = None,
     *,
     length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit | None = None,
@@ -77,6 +77,7 @@ def read_dh_table(
     Parameters
     ----------
     name : of the robot
+    convention : None means standard, unless the table says another, or can hardly be read so
     length_unit, angle_unit : units of a table whose column names say mm and deg although its values are in other units;
         None means mm and deg, unless the values can't be
     as_printed : keep values in the unit that their column says although they look like another; each gives a
@@ -107,9 +108,16 @@ def read_dh_table(
     notes += _in_own_units(path, rows, length_unit, angle_unit, as_printed, own=converted, printed=printed)
     short = _short_lengths(path, rows, converted, as_printed, bool(length_unit or _calibrated(rows, convention)))
     given = set(names)
-    if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
+    if len(stated := {row["convention"] for row in rows if "convention" in given}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
-    convention = next(iter(stated), convention)
+    said = next(iter(stated), convention)
+    # A first row without a and alpha is usual in Craig's tables; read as standard, two joints would do one's work.
+    idle = [not (row["a_mm"] or row["alpha_deg"]) for row in rows if row.get("type") not in FIXED]
+    if said is None and not as_printed and sum(idle) == 1 and idle[0] and idle[1:] and _unit(rows[1]) == "deg":
+        problem = "read as standard D-H, joints 1 and 2 turn about one line; read as modified D-H, none do"
+        remedy = "Write modified D-H or standard D-H above the table, or say it by --convention"
+        raise InputError(path, "convention", problem, remedy)
+    convention = said or "standard"
     _check_pairs_of_limits(path, given)
     notes += _fixed_said(rows)
     rows, placed = _without_fixed_rows(rows, convention)

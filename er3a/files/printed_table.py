@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
-from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
+from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
 from er3a.files.csv_file import Lines
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, Code, code_grids
@@ -31,7 +31,7 @@ from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
 FIXED = "fixed", "tool"
 NEEDED = frozenset({"a", "alpha", "d"})
 PER_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-OWN = {"type", "theta", "beta", "calibrated", "direction", "convention", "lower", "upper", "speed"}
+OWN = words_of("type theta beta calibrated direction convention lower upper speed")
 _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
@@ -50,8 +50,10 @@ _STARRED = re.compile(r"^\*$|\w\^?\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
 _NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
 _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
-_KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
-_KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
+_KINDS = words_of(
+    "r=revolute 0=revolute rot=revolute rotational=revolute rotary=revolute 旋转=revolute "
+    "p=prismatic 1=prismatic linear=prismatic 移动=prismatic"
+)
 _KIND_ELSEWHERE = re.compile(
     r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?\w*[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b|"
     r"(?:types?|sigma)\s*=\s*[\[{(][^\n]*(?:prismatic|\b1\b))",
@@ -81,7 +83,7 @@ SIGNS = {
 ``d sin(alpha)``, whatever its names (``cos(x), -sin(x), -sin(x)*y``), and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
-    r"(?=[),;，；。%#≈`\n]|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
+    r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
@@ -156,6 +158,8 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     """
     text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)[ \t]+(.+)$", r"\1 = \2;", text)
     text = re.sub(r"&#?\w+;", lambda found: html.unescape(found[0]), text)
+    if all(re.match(r"\s*(?:[#%]|//|$)", line) for line in text.split("\n")):  # all of it is a comment
+        text = re.sub(r"(?m)^[ \t]*(?:[#%]+|//+)", "", text)
     try:
         found, from_code = _tables(text, columns)
     except InputError as error:
@@ -217,6 +221,9 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     if bare := code_grids(text, headed=False):
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
+        for name, order in Code(text).orders.items():
+            taken = ",".join(quantities_of(order))
+            remedy = f"If they are as {name} takes them, say so: --column {taken}, without what the matrix leaves out"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
     return [], False
 
@@ -238,8 +245,8 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
     open_one, broken = False, 0
     width = len(columns)
     for line, cells in grid:
-        if len(cells) == width + 1 and not cells[-1]:  # the mark at the end of a line
-            cells = cells[:-1]
+        if len(cells) == 1 + (width or (len(tables[-1][0][1]) if tables else 0)) and not cells[-1]:
+            cells = cells[:-1]  # the mark at the end of a line
         titled = is_printed_table(cells)
         if titled and columns and len(cells) != width:
             if width in (len(other) for _, other in grid):
@@ -368,7 +375,7 @@ class _Table:
                 remedy = "Say what the columns are, - for one that is not read: --column joint,theta,d,a,alpha"
                 self._refuse(None, k, f"it and column '{other}' both mean {own.quantity}", remedy)
         signs = [own.sign if own.sign in ("d", "r") else own.quantity for own in self.headings.values()]
-        if [each for each in signs if each in ("alpha", "d", "theta", "r")] == ["alpha", "d", "theta", "r"]:
+        if [each for each in signs if each in ("alpha", "d", "r")] == ["alpha", "d", "r"] and signs[0] != "theta":
             remedy = "Say which by --column: a for d and d for r (Khalil), or d for d and a for r"
             self._refuse(None, self.column["a"], "columns d and r: either can be the link's length", remedy)
 
@@ -586,7 +593,8 @@ class _Table:
             if offsets:
                 self.notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
         elif offsets:
-            self._refuse(None, k, f"{offsets[0]}: another column holds offsets too", "Keep one")
+            remedy = "Add it to the offset, or leave it out if the table is the Robotics Toolbox's, which ignores it"
+            self._refuse(None, k, f"{offsets[0]}, and there are offsets too", remedy)
         if any(sliding):
             self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])
 

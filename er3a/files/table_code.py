@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import NoReturn
 
 from er3a.errors import InputError
+from er3a.files.arithmetic import words_of
 from er3a.files.code_brackets import CodeGroup, groups_of, parts
 from er3a.files.table_cells import Grid
 from er3a.files.table_headings import heading_of, quantities_of
@@ -29,14 +31,11 @@ _TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
 _FIELD = r"(?:(?:double|float|\w+_t)\s+)?(\w+)\s*(?:;|:\s*(?:float|f32|f64|double)\b)"
 _TYPE = re.compile(rf"(?:struct|class)\s+(\w*)[^{{}}\n]*[{{:]?\s*(?:(?:{_FIELD})[^\n]*\s*){{3,8}}(?:\}}\s*(\w*))?")
 """A type whose fields are numbers: in C its name may follow."""
-_OF_LINK = "theta", "d", "a", "alpha", "sigma", "offset"
-_ORDERS = {
-    "dhlink": ("d", "alpha", "theta", "a", "sigma"),
-    "revolutedh": ("d", "a", "alpha", "offset"),
-    "revolutemdh": ("d", "a", "alpha", "offset"),
-    "prismaticdh": ("theta", "a", "alpha", "offset"),
-    "prismaticmdh": ("theta", "a", "alpha", "offset"),
-}
+_OF_LINK = [*words_of("theta d a alpha sigma offset")]
+_ORDERS = words_of(
+    "dhlink=d,alpha,theta,a,sigma revolutedh=d,a,alpha,offset revolutemdh=d,a,alpha,offset "
+    "prismaticdh=theta,a,alpha,offset prismaticmdh=theta,a,alpha,offset"
+)
 """The order of arguments without names, by the function."""
 LIBRARIES = {
     "SerialLink": ("theta,d,a,alpha,type,offset", ""),
@@ -91,12 +90,16 @@ class Code:
 def row_cells(text: str) -> list[str]:
     """The elements of a list, with commas or, as MATLAB takes them, blanks between them."""
     cells = parts(text)
-    if len(cells) == 1:
-        text = re.sub(r"\s*([*/^])\s*", r"\1", text.strip())
-        text = re.sub(r"(?<=[\w)\]])\s+([-+])\s+", r"\1", text)
-        text = re.sub(r"[(\[{][^()\[\]{}]*[)\]}]", lambda found: found[0].replace(" ", ""), text)
-        cells = text.split()
+    if len(cells) == 1 or not re.search("[\"']", text):
+        cells = [each for part in parts(_closed_up(text)) for each in part.split() or [""]]
     return [cell.strip("\"'") for cell in (cells if cells[-1:] != [""] else cells[:-1])]
+
+
+def _closed_up(text: str) -> str:
+    """A list without the blanks within its elements."""
+    text = re.sub(r"[ \t]*([*/^])[ \t]*|(?<=[\w)\]])[ \t]+([-+])[ \t]+", r"\1\2", text.strip())
+    text = re.sub(r"(^|[,;\n])([ \t]*[-+])[ \t]+", r"\1\2", text)
+    return re.sub(r"[(\[{][^()\[\]{}]*[)\]}]", lambda found: found[0].replace(" ", ""), text)
 
 
 def _rows(code: Code, group: CodeGroup) -> Grid:
@@ -181,7 +184,7 @@ def _puts_in(found: re.Match[str], name: str) -> bool:
     place, given = found.groups()
     value = re.sub(r"[\[(][\w:, +-]*[\])]", "", given or "")  # without indices
     if place:
-        return bool(re.search(r"[-\d\[{]", value))
+        return bool(re.search(r"-|(?<!\w)\d|[\[{]", value))
     own = re.search(rf"(?<![\w.])(?:self\.)?{name}\b", value)
     return given is None or bool(own and not _CONVERTED.match(given))
 
@@ -205,7 +208,7 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
     records = 0
     for each in code.groups:
         if each.bracket == "{" and _is_row(cells := _record(each)):
-            rows.append(_Link(code.line(each.start), "", each.start, cells))
+            rows.append(_Link("", each.start, cells))
             records += 1
             continue
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
@@ -226,7 +229,7 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
             )
             if added and named[1] is None:
                 target = f"{added[1]}[{each.start}"
-            rows.append(_Link(code.line(each.start), target, each.start, cells))
+            rows.append(_Link(target, each.start, cells))
         elif not cells and toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
             unread.append(each)
     if "Frame::DH(" in code.text:
@@ -239,15 +242,14 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
     texts = [cell for row in rows for cell in _constants(row.cells)]
     looped = re.search(r"\bfor\b", code.text) and len(rows) == 1
     if len(rows) > records and (re.search(_ADDED, code.text) or looped or runs):
-        problem = f"'{', '.join(texts)[:60]}': links of another program, or of a loop, are added"
-        raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
+        _refuse_loop(code, rows[0].place, ", ".join(texts))
     names = {row.name: row for row in rows}
     chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in code.groups if each.bracket == "["]
     arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups if each.bracket in "[{"]
     held = [each for each in held if len(each) > 1]
     held = arms or [each for one in held or [rows] for each in _begun_again(one)]
-    return [_grid([(row.line, row.cells) for row in each]) for each in held if each], runs
+    return [_grid([(code.line(row.place), row.cells) for row in each]) for each in held if each], runs
 
 
 def _record(group: CodeGroup) -> dict[str, str]:
@@ -289,8 +291,7 @@ def _check_taken(code: Code, call: CodeGroup, cells: dict[str, str]) -> None:
         words = re.findall(r"[^\W\d]\w*", taken[1]) if taken else [""]
         own = taken and (_ELEMENT.fullmatch(taken[1]) or words[-1] in lists)
         if not own and [_place(each) for each in words[-1:] if heading_of(each)] != [_place(name)]:
-            problem = f"'{cell}' is worked out for each link"
-            raise InputError(None, f"line {code.line(call.start)}", problem, "Write a row for each joint")
+            _refuse_loop(code, call.start, cell)
 
 
 def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
@@ -304,8 +305,12 @@ def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
     left_out = not given & {"offset", "theta", "row"} and any(map(_turns, grids))  # offsets that no link takes
     if grids and not left_out and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
         return
-    problem = f"'{' '.join(runs[0].inside.split())[:60]}': links of another program, or of a loop, are added"
-    raise InputError(None, f"line {code.line(runs[0].start)}", problem, "Write a row for each joint")
+    _refuse_loop(code, runs[0].start, runs[0].inside)
+
+
+def _refuse_loop(code: Code, place: int, text: str) -> NoReturn:
+    problem = f"'{' '.join(text.split())[:60]}': links of another program, or of a loop, are added"
+    raise InputError(None, f"line {code.line(place)}", problem, "Write a row for each joint")
 
 
 def _turns(grid: Grid) -> bool:
@@ -394,7 +399,6 @@ def _constants(cells: dict[str, str]) -> list[str]:
 
 @dataclass(frozen=True)
 class _Link:
-    line: int
     name: str
     place: int
     cells: dict[str, str]
@@ -438,14 +442,14 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
     if toolbox is None:
         return cells if _is_row(cells) and not given else None
     if len(given) == 1 and given[0].startswith("["):
-        order = ("alpha", "a", "theta", "d", "sigma") if function == "link" else _OF_LINK
+        order = words_of("alpha a theta d sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
         if len(given) < 4:
             whole = given and _ELEMENT.fullmatch(given[0]) and not "".join(given[1:]).strip("0.")
             return {"row": given[0]} if whole else None
         cells |= dict(zip(order, given))
-    elif low in _ORDERS and len(given) <= len(_ORDERS[low]):
-        cells |= dict(zip(_ORDERS[low], given))
+    elif low in _ORDERS and len(given) <= len(order := _ORDERS[low].split(",")):
+        cells |= dict(zip(order, given))
     elif given or (low == "link" and not cells):
         return None
     return _of_toolbox(low, words, cells)
@@ -483,7 +487,11 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
     for found in re.finditer(pattern, code.text) if rows else ():
         cells = next((row.cells for row in rows if row.name == found[1]), None)
         if cells is None or found[2] not in cells:
-            if found[1] == "self":
+            name = f"{found[1]}.{found[2]}"
+            taking = [(row.cells, key) for row in rows for key, cell in row.cells.items() if cell == name]
+            for cells, key in taking:
+                cells[key] = found[3].strip()
+            if taking or found[1] == "self":
                 continue
             problem = f"{found[1]}.{found[2]} is set for a link that is not found"
             raise InputError(None, f"line {code.line(found.start())}", problem, "Write it into the link's call")
@@ -615,7 +623,7 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     for text in texts:
         text = re.sub(r"\b(?:joint_?)?type\b", "sigma", text)
         text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
-        words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->)+", text) if word]
+        words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text) if word]
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
         # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
         names = next((each for each in windows if _names_columns(each, once=len(each) > width)), [])
@@ -674,7 +682,8 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
-            r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(", re.sub(r"\w\[[^\[\]]*\]", "q", inside)
+            r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
+            re.sub(r"\w\[[^\[\]]*\]", "q", _closed_up(inside)),
         )
         if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
             continue
@@ -711,7 +720,7 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
         of_others = name in "Ll" and "a" in named and places["a"][1] not in "rR"
         if quantity not in _OF_VECTORS or not cells or of_others:
             continue
-        header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
+        header[quantity] = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
         places.setdefault(quantity, (line, name))
         if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
             first, other = places[quantity]
@@ -729,7 +738,7 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
     return [[(0, [header[name] for name in named]), *((1, list(row)) for row in zip(*named.values()))]]
 
 
-_OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
+_OF_VECTORS = words_of("a alpha d theta offset type direction pose")
 
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
@@ -747,11 +756,12 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     for name, entries in found.items():
         last, cells = entries[max(entries)], {k: each[4].strip() for k, each in entries.items()}
         of_link = found["alpha" if name in ("alpha", "a") else "d"]
-        gaps = {*range(min(of_link), max(entries) + 1)} - {*entries}
+        first = min(entries) if len(entries) == len(of_link) else min(of_link)
+        gaps = {*range(first, max(entries) + 1)} - {*entries}
         if gaps and last[3] == ":" and _place(name) == "theta":  # what is not replaced stays a variable
             cells |= {k: f"{name}{k}" for k in gaps}
         elif gaps:
             problem = f"{name}{min(gaps)} is missing"
             raise InputError(None, f"line {code.line(last.start())}", problem, "Give one for each joint")
-        before = "(i-1)" if min(of_link) < min(found["d"]) else ""
+        before = "(i-1)" if min(of_link) < max(min(each) for each in found.values()) else ""
         yield name + before, [cells[k] for k in sorted(cells)], code.line(last.start()), last[3]
