@@ -119,7 +119,8 @@ def read_dh_table(
         raise InputError(path, "convention", problem, remedy)
     convention = said or "standard"
     _check_pairs_of_limits(path, given)
-    notes += _fixed_said(rows)
+    if fixed := [str(row["row"]) for row in rows if row.get("type") in FIXED]:
+        notes.append(f"row {', '.join(fixed)}: nothing moves there; read as a fixed transform")
     rows, placed = _without_fixed_rows(rows, convention)
     if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MAX_JOINTS:
         problem = f"the joints are {', '.join(str(row['joint']) for row in rows) or 'none'}"
@@ -188,11 +189,6 @@ def _short_lengths(path: Path, rows: list[dict[str, Any]], own: set[str], as_pri
 
 PARALLEL = 1e-9  # sine of an angle between axes below which a common normal has no digits left
 DIGITS = 9  # of mm and deg, that products of matrices leave
-
-
-def _fixed_said(rows: list[dict[str, Any]]) -> Iterator[str]:
-    if fixed := [str(row["row"]) for row in rows if row.get("type") in FIXED]:
-        yield f"row {', '.join(fixed)}: nothing moves there; read as a fixed transform"
 
 
 def _without_fixed_rows(rows: list[dict[str, Any]], convention: str) -> tuple[list[dict[str, Any]], dict[str, Reals]]:

@@ -168,8 +168,10 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     if not tables:
         return None
     if len(tables) > 1:
-        lines = " and ".join(str(table[0][0] or table[1][0]) for table in tables[:2])
-        raise InputError(path, None, f"{len(tables)} D-H tables, at lines {lines}", "Give a file with one of them")
+        problem = (
+            f"{len(tables)} D-H tables, at lines {' and '.join(str(one[0][0] or one[1][0]) for one in tables[:2])}"
+        )
+        raise InputError(path, None, problem, "Give a file with one of them")
     return _Table(path, text, tables[0], from_code).converted()
 
 
@@ -222,8 +224,7 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         for name, order in Code(text).orders.items():
-            taken = ",".join(quantities_of(order))
-            remedy = f"If they are as {name} takes them, say so: --column {taken}, without what the matrix leaves out"
+            remedy = f"If they are as {name} takes them, say so: --column {','.join(quantities_of(order))}"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
     return [], False
 
@@ -262,7 +263,8 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
             filled = [cell for cell in cells if cell]
             header = tables[-1][0][1]
             if len(tables[-1]) == 1 and filled and all(map(_unit_in, filled)) and len(cells) == len(header):
-                tables[-1][0] = line, _with_units(header, cells)
+                units = map(_unit_in, cells)
+                tables[-1][0] = line, [f"{name} [{unit}]" if unit else name for name, unit in zip(header, units)]
             elif len(filled) < 2 or all("=" in cell for cell in filled):
                 broken = line
             elif (len(cells) != len(header) and not _numeric(filled)) or (broken and not _numeric(filled)):
@@ -280,10 +282,6 @@ def _numeric(cells: list[str]) -> bool:
 
 def _unit_in(cell: str) -> str:
     return UNITS.get(plain(cell).strip("()[] .").lower(), "")
-
-
-def _with_units(header: list[str], cells: list[str]) -> list[str]:
-    return [f"{name} [{_unit_in(cell)}]" if _unit_in(cell) else name for name, cell in zip(header, cells)]
 
 
 def _with_names(table: Grid) -> Grid:
@@ -406,14 +404,15 @@ class _Table:
         for names, values in together:
             if names.count(",") == values.count(","):
                 given += zip(names.split(","), map(str.strip, values.strip(" ;").split(",")), itertools.repeat(""))
+        given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
         found: dict[str, str] = {}
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
-                _keep(found, name.strip(), _in_unit(value, unit))
-        found |= dict.fromkeys(re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text), TWO_VALUES)
+                value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
+                found[name.strip()] = value if found.get(name.strip(), value) == value else TWO_VALUES
         plainly: dict[str, str] = {}
         for name, value in found.items():
-            _keep(plainly, name_of(name), value)
+            plainly[name_of(name)] = value if plainly.get(name_of(name), value) == value else TWO_VALUES
         return plainly | found
 
     def converted(self) -> PrintedTable:
@@ -575,8 +574,8 @@ class _Table:
         """A column of constants; a sliding joint's d keeps the constant beside its variable."""
         for row, (found, kind) in enumerate(zip(self.amounts[quantity], self.kinds)):
             if found and found.variables and not (quantity == "d" and kind == "prismatic"):
-                name = min(found.variables)
-                self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
+                problem = f"'{min(found.variables)}' has no value"
+                self._refuse(row, k, problem, f"Write {min(found.variables)} = ... below the table")
         self._add(k, quantity, self.amounts[quantity])
 
     def _theta(self, k: int) -> None:
@@ -603,8 +602,8 @@ class _Table:
         for row, each in enumerate(self.amounts["theta"]):
             right = {"deg": (90.0,), "rad": (math.pi / 2,)}.get(each.unit, (90.0, math.pi / 2)) if each else ()
             if each and all(abs(math.remainder(each.number, quarter)) > RIGHT_WITHIN for quarter in right):
-                problem = f"'{self.rows[row][1][k]}' may be an offset, or the angle of a pose"
-                self._refuse(row, k, problem, "Say so by --column: offset if theta = q + offset, or - if it is a pose")
+                remedy = "Say so by --column: offset if theta = q + offset, or - if it is a pose"
+                self._refuse(row, k, f"'{self.rows[row][1][k]}' may be an offset, or the angle of a pose", remedy)
 
     def _add(self, k: int, name: str, found: list[CellAmount | None]) -> None:
         """A column of a quantity, in the unit that its heading or cells say; in mm or degrees if none do."""
@@ -622,8 +621,7 @@ class _Table:
         if not unit and not units and not length and bare < RADIANS_BELOW_DEG and self._has_radians():
             unit = "rad"
         if bare and ((len(units) > 1 and not unit) or (unit == "rad" and units and bare > 2 * math.pi)):
-            problem = f"{bare:g} among values in {' and '.join(units)}: which unit?"
-            self._refuse(None, k, problem, "Write all its values in one unit")
+            self._refuse(None, k, f"{bare:g} among values in {' and '.join(units)}", "Write all in one unit")
         column = f"{name}_{unit or ('mm' if length else 'deg')}"
         if not unit and not units:
             self.unsaid.add(column)
@@ -634,16 +632,6 @@ class _Table:
         """Whether other columns are in radians, whose small angles are radians then."""
         texts = [cell.lower() for _, cells in self.rows for cell in cells]
         return any(own.unit == "rad" for own in self.headings.values()) or any("π" in x or "pi" in x for x in texts)
-
-
-def _keep(found: dict[str, str], name: str, value: str) -> None:
-    """A symbol's value; one with two values has none."""
-    found[name] = value if found.get(name, value) == value else TWO_VALUES
-
-
-def _in_unit(value: str, unit: str) -> str:
-    """A symbol's value with the unit that a comment says; "" if none does."""
-    return f"({value}) {unit}" if unit else value.rstrip(" \t.")
 
 
 def _in(amount: CellAmount, unit: str) -> float:

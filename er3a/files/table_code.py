@@ -146,15 +146,13 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
     links, runs = _calls(code)
-    if links := links or _records(code):
-        _check_runs(code, runs, links)
-        return links
+    links = links or _records(code)
     named = [grid for grid in matrices if grid[0][1]]
-    written = named or _vectors(code)
-    _check_runs(code, runs, written)
-    for group in code.groups if written else ():
+    found = links or named or _vectors(code)
+    _check_runs(code, runs, found)
+    for group in code.groups if found and not links else ():
         _check_kept(code, group, bool(named))
-    return written
+    return found
 
 
 _CONSTANT = {"a", "alpha", "d", "offset"}
@@ -236,8 +234,7 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
         _segments(code, rows, runs)
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
         problem = f"'{' '.join(unread[0].inside.split())[:60]}' can't be read as a link"
-        remedy = "Write its numbers there, or the matrix that they come from above it"
-        raise InputError(None, f"line {code.line(unread[0].start)}", problem, remedy)
+        raise InputError(None, f"line {code.line(unread[0].start)}", problem, "Write its numbers there")
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
     looped = re.search(r"\bfor\b", code.text) and len(rows) == 1
@@ -385,9 +382,8 @@ def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
     texts = _constants(cells)
     if any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)|\bc\(", cell) for cell in texts):
         return False
-    given = r"(?m)^\s*{}\s*=[^\[{{\n]+$"
     return any(
-        not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(given.format(re.escape(cell)), code.text)
+        not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(rf"(?m)^\s*{re.escape(cell)}\s*=[^\[{{\n]+$", code.text)
         for cell in texts
     )
 
@@ -467,10 +463,10 @@ _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismati
 
 def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[str, str]:
     """A row of a toolbox: what is left out is 0; theta of a joint that turns, and d of one that slides, is its own."""
-    slides = "prismatic" in (*words, *re.findall("prismatic", function)) or cells.get("sigma", "0") in ("1", "1.0")
+    said = " ".join([function, *words])
+    slides = "prismatic" in said or cells.get("sigma", "0") in ("1", "1.0")
     slides |= function == "link" and "theta" in cells and "d" not in cells
-    modified = "mdh" in function or bool({"modified", "mod", "mdh", "moddh"} & {*words})
-    modified |= cells.pop("mdh", "0").lower() in ("1", "true")
+    modified = cells.pop("mdh", "0").lower() in ("1", "true") or re.search("mod|mdh", said)
     offset = cells.pop("offset", "0")
     flipped = "flip" in words or cells.pop("flip", "").lower() in ("1", "true")
     row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
@@ -493,7 +489,7 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
                 cells[key] = found[3].strip()
             if taking or found[1] == "self":
                 continue
-            problem = f"{found[1]}.{found[2]} is set for a link that is not found"
+            problem = f"{name} is set for a link that is not found"
             raise InputError(None, f"line {code.line(found.start())}", problem, "Write it into the link's call")
         cells[found[2]] = found[3].strip()
 
@@ -527,8 +523,8 @@ def _records(code: Code) -> list[Grid]:
 
 def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
     header = list(dict.fromkeys(key for _, cells in rows for key in cells))
-    blank = {"direction": "1"}
-    return [(0, header), *((line, [cells.get(key, blank.get(key, "")) for key in header]) for line, cells in rows)]
+    blank = ["1" if key == "direction" else "" for key in header]
+    return [(0, header), *((line, [*map(cells.get, header, blank)]) for line, cells in rows)]
 
 
 # Matrices and lists ---------------------------------------------------------------------------------------------------
@@ -562,8 +558,8 @@ def _listed(code: Code) -> Grid:
             continue
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
-            numbers = 4 <= len(cells) <= 8 and all(re.search(r"\d|pi|π", cell) for cell in cells)
-            if numbers and len(cells) == len((rows or [(0, cells)])[0][1]):
+            alike = len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= 8
+            if alike and all(re.search(r"\d|pi|π", cell) for cell in cells):
                 rows.append((code.line(group.start), cells))
                 labels.append(label[1] or label[2] or "")
                 arms.add((label[2] or "").rstrip("0123456789"))
@@ -723,8 +719,9 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
         header[quantity] = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
         places.setdefault(quantity, (line, name))
         if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
-            first, other = places[quantity]
-            problem = f"'{name}' is another list of {quantity} than '{other}' of line {first}"
+            problem = (
+                f"'{name}' is another list of {quantity} than '{places[quantity][1]}' of line {places[quantity][0]}"
+            )
             raise InputError(None, f"line {line}", problem, "Give the lists of one arm, each with its own name")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
@@ -761,7 +758,7 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         if gaps and last[3] == ":" and _place(name) == "theta":  # what is not replaced stays a variable
             cells |= {k: f"{name}{k}" for k in gaps}
         elif gaps:
-            problem = f"{name}{min(gaps)} is missing"
-            raise InputError(None, f"line {code.line(last.start())}", problem, "Give one for each joint")
+            where = f"line {code.line(last.start())}"
+            raise InputError(None, where, f"{name}{min(gaps)} is missing", "Give one for each joint")
         before = "(i-1)" if min(of_link) < max(min(each) for each in found.values()) else ""
         yield name + before, [cells[k] for k in sorted(cells)], code.line(last.start()), last[3]
