@@ -36,7 +36,7 @@ _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
     (r"[{}$]", ""),
-    (r"\((?:t|fixed|var(?:iable|\.)?|变量)\)", ""),
+    (r"\((?:t|fixed|var(?:iable|\.)?|[一-鿿]+)\)", ""),
     (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
@@ -223,8 +223,6 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     if bare := code_grids(text, headed=False):
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
-        for name, order in Code(text).orders.items():
-            remedy = f"If they are as {name} takes them, say so: --column {','.join(quantities_of(order))}"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
     return [], False
 

@@ -585,7 +585,12 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     of a library."""
     width = len(rows[0][1])
     lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
-    typed = [code.orders[name] for name in code.fields.keys() & code.orders if re.search(rf"\b{name}\b", before)]
+    typed = [
+        names
+        for name, names in code.orders.items()
+        if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
+        or (name in code.fields and re.search(rf"\b{name}\b", before))
+    ]
     near = next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
     used = _columns_in(
         [
@@ -617,7 +622,7 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     """The names of columns that texts hold one after the other; [] if they hold several orders."""
     found: dict[str, list[str]] = {}
     for text in texts:
-        text = re.sub(r"\b(?:joint_?)?type\b", "sigma", text)
+        text = re.sub(r"(?<=,)(\s*)_(?=,|$)", r"\1theta", re.sub(r"\b(?:joint_?)?type\b", "sigma", text))
         text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
         words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text) if word]
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
@@ -651,8 +656,9 @@ def _given_to(code: Code, *, toolbox: bool = False) -> Iterator[tuple[str, str]]
 
 def _indexed(code: Code) -> Iterator[str]:
     """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
-    made = [f"{name}={part}" for name, part in _given_to(code)]
-    if any(name == "row" for name, _ in _given_to(code)):
+    given = [*_given_to(code)]
+    made = [f"{name}={part}" for name, part in given]
+    if "row" in dict(given):
         yield from (",".join(_OF_LINK[:width]) for width in (4, 5, 6))
     found: dict[str, dict[int, str]] = {}
     pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"

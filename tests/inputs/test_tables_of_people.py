@@ -818,8 +818,44 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "| i | a (mm) | alpha (deg) | d (mm) | offset (deg) | note |\n|--|--|--|--|--|--|\n"
         "| 1 | 0 | -90 | 290 | 0 | As given: theta=0, alpha=-90deg, d=L1, a=0. |\n"
         "| 2 | 270 | 0 | 0 | -90 | As given: theta=-90deg, alpha=0, d=0, a=L2. |\n",
+        "% L(1) = Link('d', 290, 'a', 0, 'alpha', -pi/2);\n"
+        "% L(2) = Link('d', 0, 'a', 270, 'alpha', 0, 'offset', -pi/2);\n",
+        "part{1}.a = 0; part{1}.alpha = -pi/2; part{1}.d = 290;\npart{2}.a = 270; part{2}.alpha = 0; part{2}.d = 0;\n"
+        "L = [Revolute('d', part{1}.d, 'a', part{1}.a, 'alpha', part{1}.alpha)\n"
+        "Revolute('d', part{2}.d, 'a', part{2}.a, 'alpha', part{2}.alpha, 'offset', -pi/2)];\n",
+        "i | a | alpha | d | theta\n--|--|--|--|--\n1 | 0|-pi/2|290|q1|\n2 | 270|0|0|q2 - pi/2|\n",
+        "| i | a | alpha | d | theta |\n|--|--|--|--|--|\n| 1 | 0 | -pi/2 | d1 | q1 |\n"
+        "| 2 | a2 | 0 | 0 | q2 - pi/2 |\n\n"
+        "- d1 = 290: from the drawing\n- a2 = 270: from the drawing\n",
+        "a = [0; 270];\nd = [290; 0];\nalpha = [-pi/2; 0];\ntheta = [q1; q2 - (90 + 90)*pi/360];\n",
+        "% alpha, a, d, and theta\nDH = [-pi/2 0, 290 0;\n      0, 270 0, -pi/2];\n",
+        "def row(d, a, alpha, theta):\n    return np.eye(4)\ndh = [(290, 0, -pi/2, q1), (0, 270, 0, q2 - pi/2)]\n"
+        "for each in dh:\n    T = T @ row(*each)\n",
+        "float a_[2] = {0, 270};\nfloat alpha_[2] = {-90, 0};\nfloat d_[2] = {290, 0};\nfloat th0_[2] = {0, -90};\n",
+        "| i | α (°) | a (mm) | d (mm) | θ | θ 零位偏移 (°) |\n|--|--|--|--|--|--|\n"
+        "| 1 | -90 | 0 | 290 | θ1 | 0 (朝前) |\n| 2 | 0 | 270 | 0 | θ2 | -90 (竖直) |\n",
     ],
 )
 def test_names_and_places_that_programs_give_a_table_are_read(tmp_path, text):
     content, _ = read(tmp_path, text)
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-6)
+
+
+CRAIG = "joint,a,alpha,d,theta\n1,0,0,333,q1\n2,0,-90,0,q2\n3,82,90,316,q3\n4,-82,90,0,q4\n"
+
+
+def test_a_convention_by_which_two_joints_turn_about_one_line_is_asked_back(tmp_path):
+    path = tmp_path / "arm.csv"
+    path.write_text(CRAIG)
+    with pytest.raises(InputError, match="joints 1 and 2 turn about one line"):
+        read_dh_table(path, "arm")
+    assert read_dh_table(path, "arm", "standard")[0].dh.convention == "standard"  # said, so it is meant
+    assert read_dh_table(path, "arm", as_printed=True)[0].dh.convention == "standard"  # a comparison names the other
+    assert read(tmp_path, "Modified DH\n" + CRAIG)[0].dh.convention == "modified"
+    # As modified rows joints 3 and 4 would turn about one line, too: nothing to choose between.
+    assert read(tmp_path, CRAIG.replace("4,-82,90", "4,0,0"))[0].dh.convention == "standard"
+
+
+def test_lists_d_and_r_as_khalil_names_them_are_asked_back(tmp_path):
+    with pytest.raises(InputError, match="either can be the link's length"):
+        read(tmp_path, "alpha = [0 -pi/2 0];\nd = [0 0 265];\nr = [159 0 0];\n")
