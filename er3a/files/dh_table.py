@@ -106,7 +106,6 @@ def read_dh_table(
     converted = {column for column, name in names.items() if column != name}
     notes = [*printed.notes]
     notes += _in_own_units(path, rows, length_unit, angle_unit, as_printed, own=converted, printed=printed)
-    short = _short_lengths(path, rows, converted, as_printed, bool(length_unit or _calibrated(rows, convention)))
     given = set(names)
     if len(stated := {row["convention"] for row in rows if "convention" in given}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
@@ -118,6 +117,7 @@ def read_dh_table(
         remedy = "Write modified D-H or standard D-H above the table, or say it by --convention"
         raise InputError(path, "convention", problem, remedy)
     convention = said or "standard"
+    short = _short_lengths(path, rows, converted, as_printed, bool(length_unit or _calibrated(rows, convention)))
     _check_pairs_of_limits(path, given)
     if fixed := [str(row["row"]) for row in rows if row.get("type") in FIXED]:
         notes.append(f"row {', '.join(fixed)}: nothing moves there; read as a fixed transform")
@@ -162,10 +162,10 @@ def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -
 
 def _check_pairs_of_limits(path: Path, given: set[str]) -> None:
     """Reject a column of limits without that of the other ends."""
-    for unit in ("deg", "mm"):
-        if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
-            missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
-            raise InputError(path, f"column {missing}", "missing beside the other limit", "Give both limits, or none")
+    for pair in {"lower_deg", "upper_deg"}, {"lower_mm", "upper_mm"}:
+        if len(missing := pair - given) == 1:
+            problem = "missing beside the other limit"
+            raise InputError(path, f"column {missing.pop()}", problem, "Give both limits, or none")
 
 
 def _short_lengths(path: Path, rows: list[dict[str, Any]], own: set[str], as_printed: bool, meant: bool) -> bool:

@@ -86,6 +86,10 @@ class Code:
         """The number of the line of a place in the text."""
         return self.text.count("\n", 0, place) + 1
 
+    def refuse(self, place: int, text: str, problem: str, remedy: str) -> NoReturn:
+        """Refuse a passage, which is quoted."""
+        raise InputError(None, f"line {self.line(place)}", f"'{' '.join(text.split())[:60]}' {problem}", remedy)
+
 
 def row_cells(text: str) -> list[str]:
     """The elements of a list, with commas or, as MATLAB takes them, blanks between them."""
@@ -150,8 +154,11 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     named = [grid for grid in matrices if grid[0][1]]
     found = links or named or _vectors(code)
     _check_runs(code, runs, found)
-    for group in code.groups if found and not links else ():
-        _check_kept(code, group, bool(named))
+    if found and not links:
+        for group in code.groups:
+            _check_kept(code, group, bool(named))
+        if moved := re.search(_TURNED, code.text):
+            code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
     return found
 
 
@@ -171,9 +178,8 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
         return
     changes = [found for found in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(found, name)]
     for change in [*_MOVED.finditer(group.before), *changes]:
-        problem = f"'{change[0].strip(' ;')[:60]}' changes '{name}'"
-        line = code.line(change.end() if change in changes else group.start)
-        raise InputError(None, f"line {line}", problem, "Write what the program makes of it")
+        place = change.end() if change in changes else group.start
+        code.refuse(place, change[0].strip(" ;"), f"changes '{name}'", "Write what the program makes of it")
 
 
 def _puts_in(found: re.Match[str], name: str) -> bool:
@@ -193,6 +199,7 @@ _SET = (
 )
 """A statement that puts something into a list, or gives its name to something else."""
 _CONVERTED = re.compile(r"\s*(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\(", re.I)
+_TURNED = r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*)?[-+].*(?:pi|\d).*"
 _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)
 
 
@@ -233,13 +240,12 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
     if "Frame::DH(" in code.text:
         _segments(code, rows, runs)
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
-        problem = f"'{' '.join(unread[0].inside.split())[:60]}' can't be read as a link"
-        raise InputError(None, f"line {code.line(unread[0].start)}", problem, "Write its numbers there")
+        code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
     looped = re.search(r"\bfor\b", code.text) and len(rows) == 1
     if len(rows) > records and (re.search(_ADDED, code.text) or looped or runs):
-        _refuse_loop(code, rows[0].place, ", ".join(texts))
+        code.refuse(rows[0].place, ", ".join(texts), *_OF_LOOP)
     names = {row.name: row for row in rows}
     chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in code.groups if each.bracket == "["]
     arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
@@ -247,6 +253,9 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
     held = [each for each in held if len(each) > 1]
     held = arms or [each for one in held or [rows] for each in _begun_again(one)]
     return [_grid([(code.line(row.place), row.cells) for row in each]) for each in held if each], runs
+
+
+_OF_LOOP = ("is of a loop, or of another program", "Write a row for each joint")
 
 
 def _record(group: CodeGroup) -> dict[str, str]:
@@ -288,7 +297,7 @@ def _check_taken(code: Code, call: CodeGroup, cells: dict[str, str]) -> None:
         words = re.findall(r"[^\W\d]\w*", taken[1]) if taken else [""]
         own = taken and (_ELEMENT.fullmatch(taken[1]) or words[-1] in lists)
         if not own and [_place(each) for each in words[-1:] if heading_of(each)] != [_place(name)]:
-            _refuse_loop(code, call.start, cell)
+            code.refuse(call.start, cell, *_OF_LOOP)
 
 
 def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
@@ -302,12 +311,7 @@ def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
     left_out = not given & {"offset", "theta", "row"} and any(map(_turns, grids))  # offsets that no link takes
     if grids and not left_out and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
         return
-    _refuse_loop(code, runs[0].start, runs[0].inside)
-
-
-def _refuse_loop(code: Code, place: int, text: str) -> NoReturn:
-    problem = f"'{' '.join(text.split())[:60]}': links of another program, or of a loop, are added"
-    raise InputError(None, f"line {code.line(place)}", problem, "Write a row for each joint")
+    code.refuse(runs[0].start, runs[0].inside, *_OF_LOOP)
 
 
 def _turns(grid: Grid) -> bool:
@@ -342,9 +346,8 @@ def _segments(code: Code, rows: list[_Link], runs: list[CodeGroup]) -> None:
             if kinds == ["RotZ"] and any(each.start < run.start < each.end for run in runs):
                 continue
             if row is None or len(kinds) != 1:
-                problem = f"the segment '{' '.join(each.inside.split())[:60]}' is no row of a table"
                 remedy = "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out"
-                raise InputError(None, f"line {code.line(each.start)}", problem, remedy)
+                code.refuse(each.start, each.inside, "is no row of a table", remedy)
             row.cells.update(type=_KDL[kinds[0]], convention="standard")
 
 
@@ -463,35 +466,29 @@ _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismati
 
 def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[str, str]:
     """A row of a toolbox: what is left out is 0; theta of a joint that turns, and d of one that slides, is its own."""
+    words += [flag for flag in ("mdh", "flip") if cells.pop(flag, "0").lower() in ("1", "true")]
     said = " ".join([function, *words])
     slides = "prismatic" in said or cells.get("sigma", "0") in ("1", "1.0")
     slides |= function == "link" and "theta" in cells and "d" not in cells
-    modified = cells.pop("mdh", "0").lower() in ("1", "true") or re.search("mod|mdh", said)
     offset = cells.pop("offset", "0")
-    flipped = "flip" in words or cells.pop("flip", "").lower() in ("1", "true")
     row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
     row |= {"offset": "" if slides else offset, "type": "prismatic" if slides else "revolute"}
     if slides and offset != "0":
         row["d"] = f"{row['d']}+{offset}"
-    row |= {"convention": "modified" if modified else "standard"}
-    return row | {"direction": "-1"} if flipped else row
+    row["convention"] = "modified" if re.search("mod|mdh", said) else "standard"
+    return row | {"direction": "-1"} if "flip" in words else row
 
 
 def _assigned(code: Code, rows: list[_Link]) -> None:
     """Carry out what is set after a link was made: ``L(2).offset = -pi/2``."""
     pattern = r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\s*=(?!=)\s*([^;\n]+)"
     for found in re.finditer(pattern, code.text) if rows else ():
-        cells = next((row.cells for row in rows if row.name == found[1]), None)
-        if cells is None or found[2] not in cells:
-            name = f"{found[1]}.{found[2]}"
-            taking = [(row.cells, key) for row in rows for key, cell in row.cells.items() if cell == name]
-            for cells, key in taking:
-                cells[key] = found[3].strip()
-            if taking or found[1] == "self":
-                continue
-            problem = f"{name} is set for a link that is not found"
-            raise InputError(None, f"line {code.line(found.start())}", problem, "Write it into the link's call")
-        cells[found[2]] = found[3].strip()
+        name = f"{found[1]}.{found[2]}"
+        given = [(row, key) for row in rows for key, cell in row.cells.items() if name in (cell, f"{row.name}.{key}")]
+        for row, key in given:
+            row.cells[key] = found[3].strip()
+        if not given and found[1] != "self":
+            code.refuse(found.start(), name, "is set for a link that is not found", "Write it into the link's call")
 
 
 def _is_row(cells: Iterable[str]) -> bool:
@@ -535,12 +532,12 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
     rows = _rows(code, group)
     if len(rows) < 2 or any(re.match(r"[\[{]|\([^()]*,|.*:|-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for cell in rows[0][1]):
         return []
-    pose = len(rows) == 4 and re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1]))
-    if pose or len({len(cells) for _, cells in rows}) > 1:
+    if len(rows) == 4 and re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):  # a pose
         return []
     several = len({line for line, _ in rows}) == len(rows)
     labels = [code.comments.get(line, "") if several else "" for line, _ in rows]
-    return _titled(code, rows, labels, group.before) if 3 <= len(rows[0][1]) <= 8 else []
+    widths = {len(cells) for _, cells in rows}
+    return _titled(code, rows, labels, group.before) if len(widths) == 1 and 3 <= min(widths) <= 8 else []
 
 
 def _listed(code: Code) -> Grid:
@@ -764,7 +761,6 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         if gaps and last[3] == ":" and _place(name) == "theta":  # what is not replaced stays a variable
             cells |= {k: f"{name}{k}" for k in gaps}
         elif gaps:
-            where = f"line {code.line(last.start())}"
-            raise InputError(None, where, f"{name}{min(gaps)} is missing", "Give one for each joint")
+            code.refuse(last.start(), f"{name}{min(gaps)}", "is missing", "Give one for each joint")
         before = "(i-1)" if min(of_link) < max(min(each) for each in found.values()) else ""
         yield name + before, [cells[k] for k in sorted(cells)], code.line(last.start()), last[3]

@@ -769,6 +769,7 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         ("d={0.29,0};\na={0,0.27};\nalfa={-pi/2,0};\n\nd{1}=0.29+0.061;\n", "line 5: .* changes 'd'"),
         ("a = [0, 0.27]\nalpha = np.flip([0, -pi/2])\nd = [0.29, 0]\n", "changes 'alpha'"),
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\na.append(0.1)\n", "changes 'a'"),
+        ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\nq[1] = q_s[1] - pi/2\n", "line 4: .* changes theta"),
         ("L(1)=Link('d',0.29,'a',0,'alpha',0);\nL(2)=L(1);\nL(3)=Link('d',0,'a',1,'alpha',0);", "of a loop"),
         ("L = [RevoluteDH(d=0.29, alpha=pi/2)] * 2 + [RevoluteDH(a=0.3)]\n", "of a loop"),
         ("c.addSegment(Segment(Joint(Joint::RotX), Frame::DH(0, 0, 0.29, 0)));\n", "RotX.*RotZ, TransZ or None"),
