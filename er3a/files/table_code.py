@@ -251,8 +251,10 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
     arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups if each.bracket in "[{"]
     held = [each for each in held if len(each) > 1]
-    held = arms or [each for one in held or [rows] for each in _begun_again(one)]
-    return [_grid([(code.line(row.place), row.cells) for row in each]) for each in held if each], runs
+    taken = [row for each in arms for row in each]
+    held = [each for one in held or [rows] for each in _begun_again(one)]
+    arms += [each for each in held if not taken or (_list_of(each[0]) and each[0] not in taken)]
+    return [_grid([(code.line(row.place), row.cells) for row in each]) for each in arms if each], runs
 
 
 _OF_LOOP = ("is of a loop, or of another program", "Write a row for each joint")
@@ -263,8 +265,8 @@ def _record(group: CodeGroup) -> dict[str, str]:
     if re.search(r"\b(?:struct|class|interface|type)\s+\w[^;={}]*$", group.before):
         return {}
     label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", group.before)
-    pairs = _pairs(parts(group.inside)).items()
-    cells = {key: value for key, value in pairs if not re.match(r"[(\[].*,", value)}  # no colour, no column
+    # No colour, no column.
+    cells = {key: value for key, value in _pairs(parts(group.inside)).items() if not re.match(r"[(\[].*,", value)}
     return ({"joint": label[1]} if label else {}) | cells
 
 
@@ -316,8 +318,12 @@ def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
 
 def _turns(grid: Grid) -> bool:
     """Whether a table has angles theta, or offsets, that are not 0."""
-    columns = zip(grid[0][1], zip(*(cells for _, cells in grid[1:])))
-    cells = [cell for name, column in columns if heading_of(name) and _place(name) == "theta" for cell in column]
+    cells = [
+        cell
+        for name, column in zip(grid[0][1], zip(*(cells for _, cells in grid[1:])))
+        if heading_of(name) and _place(name) == "theta"
+        for cell in column
+    ]
     return bool(re.search(r"[1-9]|pi|π", " ".join(cells), re.I))
 
 
@@ -361,8 +367,8 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     orders = {"DH": ["a", "alpha", "d", "offset"]} if "Frame::DH(" in code.text else {}
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
-        found = quantities_of(names)
-        if each.bracket != "{" and named and len(found) == 4 and {"theta", "d", "a", "alpha"} == {*map(_place, found)}:
+        alike = sorted(map(_place, quantities_of(names))) == ["a", "alpha", "d", "theta"]
+        if alike and named and each.bracket != "{":
             made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
             orders.setdefault(made[-1] if made else "", names)
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
@@ -383,9 +389,7 @@ def _of_signature(order: list[str], text: str) -> dict[str, str]:
 def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
     """Whether a row holds numbers or names of numbers, and no elements of lists."""
     texts = _constants(cells)
-    if any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)|\bc\(", cell) for cell in texts):
-        return False
-    return any(
+    return not any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)|\bc\(", cell) for cell in texts) and any(
         not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(rf"(?m)^\s*{re.escape(cell)}\s*=[^\[{{\n]+$", code.text)
         for cell in texts
     )
@@ -405,11 +409,10 @@ class _Link:
 
 def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
     """Links by the arms that they belong to: a name that is used again begins another arm, another list does too."""
-    arms: list[list[_Link]] = []
+    arms: list[list[_Link]] = [[]]
     for row in rows:
-        last = arms[-1] if arms else []
-        again = row.name and any(row.name == other.name for other in last)
-        if again or not last or _list_of(row) != _list_of(last[-1]):
+        last = arms[-1]
+        if last and (row.name in {other.name for other in last} - {""} or _list_of(row) != _list_of(last[-1])):
             arms.append([])
         arms[-1].append(row)
     return arms
@@ -634,8 +637,11 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
 def _zipped(code: Code) -> dict[str, str]:
     """The list that each variable of a loop over ``zip`` goes through, as its element."""
     loops = re.findall(r"\bfor\s+([\w, ()]+?)\s+in\s+(?:enumerate\()?zip\(([\w., ]+)\)", code.text)
-    pairs = [zip(re.findall(r"\w+", names)[::-1], re.findall(r"[\w.]+", lists)[::-1]) for names, lists in loops]
-    return {name: f"{one}[i]" for each in pairs for name, one in each}
+    return {
+        name: f"{one}[i]"
+        for names, lists in loops
+        for name, one in zip(re.findall(r"\w+", names)[::-1], re.findall(r"[\w.]+", lists)[::-1])
+    }
 
 
 def _given_to(code: Code, *, toolbox: bool = False) -> Iterator[tuple[str, str]]:
@@ -705,7 +711,7 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
     header, line, places = dict[str, str](), 0, dict[str, tuple[int, str]]()
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
-        names = (taken.get(name, "-"),) if taken else (name, bare, name.rpartition("_")[2])
+        names = (taken.get(name, "-"),) if taken else (name, bare, bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
         if heading and heading.quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
             continue  # values of joints, or their limits
@@ -730,8 +736,12 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
         return []
     if named.pop("pose", None) and "theta" not in named:
         line, name = places["pose"]
-        problem = f"'{name}' may be offsets of the joints' angles, or a pose"
-        raise InputError(None, f"line {line}", problem, "Name it offset if theta = q + offset, or remove it")
+        raise InputError(
+            None,
+            f"line {line}",
+            f"'{name}' may be offsets of the joints' angles, or a pose",
+            "Name it offset if theta = q + offset, or remove it",
+        )
     if len({len(cells) for cells in named.values()}) > 1:
         problem = f"different numbers of entries: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
         raise InputError(None, f"line {line}", problem, "Give one for each joint")

@@ -772,6 +772,11 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\nq[1] = q_s[1] - pi/2\n", "line 4: .* changes theta"),
         ("L(1)=Link('d',0.29,'a',0,'alpha',0);\nL(2)=L(1);\nL(3)=Link('d',0,'a',1,'alpha',0);", "of a loop"),
         ("L = [RevoluteDH(d=0.29, alpha=pi/2)] * 2 + [RevoluteDH(a=0.3)]\n", "of a loop"),
+        (
+            "L1 = Link('d',1,'a',0,'alpha',0);\nL2 = Link('d',0,'a',2,'alpha',0);\nSerialLink([L1 L2]);\n"
+            "E(1) = Revolute('d',3,'a',0,'alpha',0);\nE(2) = Revolute('d',0,'a',4,'alpha',0);\n",
+            "2 D-H tables",
+        ),
         ("c.addSegment(Segment(Joint(Joint::RotX), Frame::DH(0, 0, 0.29, 0)));\n", "RotX.*RotZ, TransZ or None"),
         (
             "c.addSegment(Segment(Joint(Joint::RotZ), Frame::DH(0, 0, 1, 0)));\nc.addSegment(Segment(fixed, H));",
@@ -807,6 +812,7 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "var Arm = Params{\n\tThetaOffsets: []float64{0, -math.Pi / 2},\n\tAlphaValues: []float64{-math.Pi / 2, 0},\n"
         "\tAValues: []float64{0, 270},\n\tDValues: []float64{290, 0},\n}\n",
         "alphas = [-np.pi/2, 0]\na_vals = [0, 270]\nd_values = [290, 0]\ntheta_offsets = [0, -np.pi/2]\n",
+        "ar_alpha_vals = [-np.pi/2, 0]\nar_a_vals = [0, 270]\nar_d_vals = [290, 0]\nar_theta_offsets = [0, -np.pi/2]\n",
         "double a1=0,alpha1=-std::numbers::pi/2,d1=290,offset1=0;\n"
         "double a2=270,alpha2=0,d2=0,offset2=-std::numbers::pi/2;\n",
         '"""Matrices (rx, tx, rz, tz) aka (alpha, a, theta, d)"""\n\n\n\n\n\n\ndef arm():\n    return np.array([\n'
