@@ -21,7 +21,7 @@ import scipy
 from er3a.by_value import ByValue
 from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
-from er3a.comparison.slips import Cause, CauseCode, Explained, explain
+from er3a.comparison.slips import SIDES, Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
 from er3a.geometry.transforms import (
     exp_rotation,
@@ -779,8 +779,7 @@ def _is_named(slip: Cause) -> bool:
 def _angle_slips(robot_a: Robot, robot_b: Robot, column: str) -> list[tuple[Cause, ...]]:
     """Ways in which angles of two tables can be in another unit: none, and for either those that make them usual."""
     found: list[tuple[Cause, ...]] = [()]
-    sides: tuple[Literal["a", "b"], ...] = ("a", "b")
-    for side, robot in zip(sides, (robot_a, robot_b)):
+    for side, robot in zip(SIDES, (robot_a, robot_b)):
         widest = math.degrees(np.abs(getattr(robot, column)).max(initial=0.0))
         usual = LEAST_ANGLE < widest < MOST_ANGLE
         for factor in () if usual else ANGLE_FACTORS:

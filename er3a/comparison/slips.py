@@ -89,7 +89,7 @@ def explain(one: Robot, other: Robot, found: mechanism.Match, tolerances: mechan
     if found.rank[0] == 0 and abs(_upright(one, found)) < UPRIGHT:
         return as_they_are  # signs turn a base over, they don't tilt it
     best, price, tied = as_they_are, found.cost, list[tuple[_Edit, ...]]()
-    edits = list(_edits(one, other, tolerances))
+    edits = sorted(_edits(one, other, tolerances), key=lambda edit: edit.price < WHOLE)  # single numbers after the rest
     kept: list[tuple[_Edit, ...]] = [()]
     for count in range(1, TOGETHER + 1):
         if count > 1 and price <= count:
@@ -117,7 +117,7 @@ def _is_plain(robot: Robot, match: mechanism.Match, before: mechanism.Match, edi
     """Whether much less geometry differs than before, or the arms are not merely defined otherwise: the base does not
     lean, and all joints turn the same way or far less differs."""
     saved = before.cost - match.cost - _price(edits)
-    if any(edit.price == WHOLE for edit in edits) and saved < CLEARLY:
+    if any(edit.price >= WHOLE for edit in edits) and saved < CLEARLY:
         return False
     turns_alike = _upright(robot, match) > UPRIGHT and (not match.reverses.any() or saved >= FAR)
     return match.rank[0] < before.rank[0] or turns_alike
@@ -136,8 +136,7 @@ def _price(edits: Sequence[_Edit]) -> float:
 def _follows(own: tuple[_Edit, ...], edit: _Edit, edits: list[_Edit]) -> bool:
     """Whether an edit comes after those chosen, so that no set is tried twice, and changes no entry of theirs."""
     names = {name for each in own for name in each.slip.entries}
-    later = not own or edits.index(edit) > edits.index(own[-1])
-    return later and not names & set(edit.slip.entries)
+    return edits.index(edit) > max(map(edits.index, own), default=-1) and names.isdisjoint(edit.slip.entries)
 
 
 def _undone(one: Robot, other: Robot, edits: Sequence[_Edit]) -> tuple[Robot, Robot]:
@@ -150,8 +149,8 @@ def _undone(one: Robot, other: Robot, edits: Sequence[_Edit]) -> tuple[Robot, Ro
 
 
 def _mechanisms(one: Robot, other: Robot, edits: Sequence[_Edit]) -> tuple[mechanism.Mechanism, mechanism.Mechanism]:
-    first, second = _undone(one, other, edits)
-    return mechanism.mechanism_of(first), mechanism.mechanism_of(second)
+    first, second = map(mechanism.mechanism_of, _undone(one, other, edits))
+    return first, second
 
 
 def _with_alternatives(slips: tuple[Cause, ...], tied: Sequence[tuple[_Edit, ...]]) -> tuple[Cause, ...]:
@@ -177,8 +176,10 @@ def _edits(one: Robot, other: Robot, tolerances: mechanism.Tolerances) -> Iterat
         price = 1.0 if slip.code.startswith("one_") or slip.columns == ("offset",) else WHOLE
         entries = slip.entries if 0 < len(slip.rows) < one.rows else ()
         columns = ", ".join(slip.columns) if slip.amount else ""
-        for side in SIDES if not slip.rows else SIDES[:1]:
-            yield _Edit(Cause(slip.code, side, entries, float(slip.amount) or None, columns), price, slip.undone)
+        for dearer, side in enumerate(SIDES[: 1 + (not slip.rows)], 1):  # B is what A is held against
+            yield _Edit(
+                Cause(slip.code, side, entries, float(slip.amount) or None, columns), price * dearer, slip.undone
+            )
     yield from _scales(one, other)
 
 

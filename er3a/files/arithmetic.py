@@ -32,15 +32,8 @@ UNITS = words_of(
 _RADIANS = {"deg2rad", "radians", "d2r", "dtr", "torad"}
 _DEGREES = {"rad2deg", "degrees"}
 _FUNCTIONS: dict[str, Callable[..., float]] = {
-    "sqrt": math.sqrt,
-    "atan": math.atan,
-    "arctan": math.atan,
-    "atan2": math.atan2,
-    "arctan2": math.atan2,
-    "asin": math.asin,
-    "acos": math.acos,
-    "sin": math.sin,
-    "cos": math.cos,
+    name: getattr(math, name.replace("arc", "a"))
+    for name in words_of("sqrt atan arctan atan2 arctan2 asin acos sin cos")
 }
 _TOKEN = re.compile(
     r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([^\W\d][\w.]*'?|°)|(\*\*|[-+*/^(),\[\]]))\s*"

@@ -64,7 +64,7 @@ ASSUMED_SLIDE_MM = 1000.0
 def read_dh_table(
     path: str | Path,
     name: str,
-    convention: Convention = "standard",
+    convention: Convention | None = None,
     *,
     length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit | None = None,
@@ -77,6 +77,7 @@ def read_dh_table(
     Parameters
     ----------
     name : of the robot
+    convention : None means standard, unless the table says another, or can hardly be read so
     length_unit, angle_unit : units of a table whose column names say mm and deg although its values are in other units;
         None means mm and deg, unless the values can't be
     as_printed : keep values in the unit that their column says although they look like another; each gives a
@@ -105,13 +106,21 @@ def read_dh_table(
     converted = {column for column, name in names.items() if column != name}
     notes = [*printed.notes]
     notes += _in_own_units(path, rows, length_unit, angle_unit, as_printed, own=converted, printed=printed)
-    short = _short_lengths(path, rows, converted, as_printed, bool(length_unit or _calibrated(rows, convention)))
     given = set(names)
-    if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
+    if len(stated := {row["convention"] for row in rows if "convention" in given}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
-    convention = next(iter(stated), convention)
+    said = next(iter(stated), convention)
+    # A first row without a and alpha is usual in Craig's tables; read as standard, two joints would do one's work.
+    idle = [not (row["a_mm"] or row["alpha_deg"]) for row in rows if row.get("type") not in FIXED]
+    if said is None and not as_printed and sum(idle) == 1 and idle[0] and idle[1:] and _unit(rows[1]) == "deg":
+        problem = "read as standard D-H, joints 1 and 2 turn about one line; read as modified D-H, none do"
+        remedy = "Write modified D-H or standard D-H above the table, or say it by --convention"
+        raise InputError(path, "convention", problem, remedy)
+    convention = said or "standard"
+    short = _short_lengths(path, rows, converted, as_printed, bool(length_unit or _calibrated(rows, convention)))
     _check_pairs_of_limits(path, given)
-    notes += _fixed_said(rows)
+    if fixed := [str(row["row"]) for row in rows if row.get("type") in FIXED]:
+        notes.append(f"row {', '.join(fixed)}: nothing moves there; read as a fixed transform")
     rows, placed = _without_fixed_rows(rows, convention)
     if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MAX_JOINTS:
         problem = f"the joints are {', '.join(str(row['joint']) for row in rows) or 'none'}"
@@ -153,10 +162,10 @@ def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -
 
 def _check_pairs_of_limits(path: Path, given: set[str]) -> None:
     """Reject a column of limits without that of the other ends."""
-    for unit in ("deg", "mm"):
-        if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
-            missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
-            raise InputError(path, f"column {missing}", "missing beside the other limit", "Give both limits, or none")
+    for pair in {"lower_deg", "upper_deg"}, {"lower_mm", "upper_mm"}:
+        if len(missing := pair - given) == 1:
+            problem = "missing beside the other limit"
+            raise InputError(path, f"column {missing.pop()}", problem, "Give both limits, or none")
 
 
 def _short_lengths(path: Path, rows: list[dict[str, Any]], own: set[str], as_printed: bool, meant: bool) -> bool:
@@ -180,11 +189,6 @@ def _short_lengths(path: Path, rows: list[dict[str, Any]], own: set[str], as_pri
 
 PARALLEL = 1e-9  # sine of an angle between axes below which a common normal has no digits left
 DIGITS = 9  # of mm and deg, that products of matrices leave
-
-
-def _fixed_said(rows: list[dict[str, Any]]) -> Iterator[str]:
-    if fixed := [str(row["row"]) for row in rows if row.get("type") in FIXED]:
-        yield f"row {', '.join(fixed)}: nothing moves there; read as a fixed transform"
 
 
 def _without_fixed_rows(rows: list[dict[str, Any]], convention: str) -> tuple[list[dict[str, Any]], dict[str, Reals]]:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
-from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
+from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
 from er3a.files.csv_file import Lines
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, Code, code_grids
@@ -31,12 +31,12 @@ from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
 FIXED = "fixed", "tool"
 NEEDED = frozenset({"a", "alpha", "d"})
 PER_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-OWN = {"type", "theta", "beta", "calibrated", "direction", "convention", "lower", "upper", "speed"}
+OWN = words_of("type theta beta calibrated direction convention lower upper speed")
 _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
     (r"[{}$]", ""),
-    (r"\((?:t|fixed|var(?:iable|\.)?|变量)\)", ""),
+    (r"\((?:t|fixed|var(?:iable|\.)?|[一-鿿]+)\)", ""),
     (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
@@ -50,8 +50,10 @@ _STARRED = re.compile(r"^\*$|\w\^?\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
 _NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
 _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
-_KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
-_KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
+_KINDS = words_of(
+    "r=revolute 0=revolute rot=revolute rotational=revolute rotary=revolute 旋转=revolute "
+    "p=prismatic 1=prismatic linear=prismatic 移动=prismatic"
+)
 _KIND_ELSEWHERE = re.compile(
     r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?\w*[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b|"
     r"(?:types?|sigma)\s*=\s*[\[{(][^\n]*(?:prismatic|\b1\b))",
@@ -81,7 +83,7 @@ SIGNS = {
 ``d sin(alpha)``, whatever its names (``cos(x), -sin(x), -sin(x)*y``), and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
-    r"(?=[),;，；。%#≈`\n]|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
+    r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
@@ -156,6 +158,8 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     """
     text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)[ \t]+(.+)$", r"\1 = \2;", text)
     text = re.sub(r"&#?\w+;", lambda found: html.unescape(found[0]), text)
+    if all(re.match(r"\s*(?:[#%]|//|$)", line) for line in text.split("\n")):  # all of it is a comment
+        text = re.sub(r"(?m)^[ \t]*(?:[#%]+|//+)", "", text)
     try:
         found, from_code = _tables(text, columns)
     except InputError as error:
@@ -164,8 +168,10 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     if not tables:
         return None
     if len(tables) > 1:
-        lines = " and ".join(str(table[0][0] or table[1][0]) for table in tables[:2])
-        raise InputError(path, None, f"{len(tables)} D-H tables, at lines {lines}", "Give a file with one of them")
+        problem = (
+            f"{len(tables)} D-H tables, at lines {' and '.join(str(one[0][0] or one[1][0]) for one in tables[:2])}"
+        )
+        raise InputError(path, None, problem, "Give a file with one of them")
     return _Table(path, text, tables[0], from_code).converted()
 
 
@@ -238,8 +244,8 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
     open_one, broken = False, 0
     width = len(columns)
     for line, cells in grid:
-        if len(cells) == width + 1 and not cells[-1]:  # the mark at the end of a line
-            cells = cells[:-1]
+        if len(cells) == 1 + (width or (len(tables[-1][0][1]) if tables else 0)) and not cells[-1]:
+            cells = cells[:-1]  # the mark at the end of a line
         titled = is_printed_table(cells)
         if titled and columns and len(cells) != width:
             if width in (len(other) for _, other in grid):
@@ -255,7 +261,8 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
             filled = [cell for cell in cells if cell]
             header = tables[-1][0][1]
             if len(tables[-1]) == 1 and filled and all(map(_unit_in, filled)) and len(cells) == len(header):
-                tables[-1][0] = line, _with_units(header, cells)
+                units = map(_unit_in, cells)
+                tables[-1][0] = line, [f"{name} [{unit}]" if unit else name for name, unit in zip(header, units)]
             elif len(filled) < 2 or all("=" in cell for cell in filled):
                 broken = line
             elif (len(cells) != len(header) and not _numeric(filled)) or (broken and not _numeric(filled)):
@@ -273,10 +280,6 @@ def _numeric(cells: list[str]) -> bool:
 
 def _unit_in(cell: str) -> str:
     return UNITS.get(plain(cell).strip("()[] .").lower(), "")
-
-
-def _with_units(header: list[str], cells: list[str]) -> list[str]:
-    return [f"{name} [{_unit_in(cell)}]" if _unit_in(cell) else name for name, cell in zip(header, cells)]
 
 
 def _with_names(table: Grid) -> Grid:
@@ -368,7 +371,7 @@ class _Table:
                 remedy = "Say what the columns are, - for one that is not read: --column joint,theta,d,a,alpha"
                 self._refuse(None, k, f"it and column '{other}' both mean {own.quantity}", remedy)
         signs = [own.sign if own.sign in ("d", "r") else own.quantity for own in self.headings.values()]
-        if [each for each in signs if each in ("alpha", "d", "theta", "r")] == ["alpha", "d", "theta", "r"]:
+        if [each for each in signs if each in ("alpha", "d", "r")] == ["alpha", "d", "r"] and signs[0] != "theta":
             remedy = "Say which by --column: a for d and d for r (Khalil), or d for d and a for r"
             self._refuse(None, self.column["a"], "columns d and r: either can be the link's length", remedy)
 
@@ -399,14 +402,15 @@ class _Table:
         for names, values in together:
             if names.count(",") == values.count(","):
                 given += zip(names.split(","), map(str.strip, values.strip(" ;").split(",")), itertools.repeat(""))
+        given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
         found: dict[str, str] = {}
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
-                _keep(found, name.strip(), _in_unit(value, unit))
-        found |= dict.fromkeys(re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text), TWO_VALUES)
+                value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
+                found[name.strip()] = value if found.get(name.strip(), value) == value else TWO_VALUES
         plainly: dict[str, str] = {}
         for name, value in found.items():
-            _keep(plainly, name_of(name), value)
+            plainly[name_of(name)] = value if plainly.get(name_of(name), value) == value else TWO_VALUES
         return plainly | found
 
     def converted(self) -> PrintedTable:
@@ -568,8 +572,8 @@ class _Table:
         """A column of constants; a sliding joint's d keeps the constant beside its variable."""
         for row, (found, kind) in enumerate(zip(self.amounts[quantity], self.kinds)):
             if found and found.variables and not (quantity == "d" and kind == "prismatic"):
-                name = min(found.variables)
-                self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
+                problem = f"'{min(found.variables)}' has no value"
+                self._refuse(row, k, problem, f"Write {min(found.variables)} = ... below the table")
         self._add(k, quantity, self.amounts[quantity])
 
     def _theta(self, k: int) -> None:
@@ -586,7 +590,8 @@ class _Table:
             if offsets:
                 self.notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
         elif offsets:
-            self._refuse(None, k, f"{offsets[0]}: another column holds offsets too", "Keep one")
+            remedy = "Add it to the offset, or leave it out if the table is the Robotics Toolbox's, which ignores it"
+            self._refuse(None, k, f"{offsets[0]}, and there are offsets too", remedy)
         if any(sliding):
             self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])
 
@@ -595,8 +600,8 @@ class _Table:
         for row, each in enumerate(self.amounts["theta"]):
             right = {"deg": (90.0,), "rad": (math.pi / 2,)}.get(each.unit, (90.0, math.pi / 2)) if each else ()
             if each and all(abs(math.remainder(each.number, quarter)) > RIGHT_WITHIN for quarter in right):
-                problem = f"'{self.rows[row][1][k]}' may be an offset, or the angle of a pose"
-                self._refuse(row, k, problem, "Say so by --column: offset if theta = q + offset, or - if it is a pose")
+                remedy = "Say so by --column: offset if theta = q + offset, or - if it is a pose"
+                self._refuse(row, k, f"'{self.rows[row][1][k]}' may be an offset, or the angle of a pose", remedy)
 
     def _add(self, k: int, name: str, found: list[CellAmount | None]) -> None:
         """A column of a quantity, in the unit that its heading or cells say; in mm or degrees if none do."""
@@ -614,8 +619,7 @@ class _Table:
         if not unit and not units and not length and bare < RADIANS_BELOW_DEG and self._has_radians():
             unit = "rad"
         if bare and ((len(units) > 1 and not unit) or (unit == "rad" and units and bare > 2 * math.pi)):
-            problem = f"{bare:g} among values in {' and '.join(units)}: which unit?"
-            self._refuse(None, k, problem, "Write all its values in one unit")
+            self._refuse(None, k, f"{bare:g} among values in {' and '.join(units)}", "Write all in one unit")
         column = f"{name}_{unit or ('mm' if length else 'deg')}"
         if not unit and not units:
             self.unsaid.add(column)
@@ -626,16 +630,6 @@ class _Table:
         """Whether other columns are in radians, whose small angles are radians then."""
         texts = [cell.lower() for _, cells in self.rows for cell in cells]
         return any(own.unit == "rad" for own in self.headings.values()) or any("π" in x or "pi" in x for x in texts)
-
-
-def _keep(found: dict[str, str], name: str, value: str) -> None:
-    """A symbol's value; one with two values has none."""
-    found[name] = value if found.get(name, value) == value else TWO_VALUES
-
-
-def _in_unit(value: str, unit: str) -> str:
-    """A symbol's value with the unit that a comment says; "" if none does."""
-    return f"({value}) {unit}" if unit else value.rstrip(" \t.")
 
 
 def _in(amount: CellAmount, unit: str) -> float:

@@ -60,7 +60,7 @@ class ReadArm:
 def read_arm(
     source: str,
     *,
-    convention: Convention = "standard",
+    convention: Convention | None = None,
     length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit | None = None,
     base: str | None = None,
@@ -122,7 +122,7 @@ def read_arm(
 
 def load_robot(
     name_or_path: str | Path,
-    convention: Convention = "standard",
+    convention: Convention | None = None,
     xacro: Sequence[str] = (),
     *,
     base: str | None = None,
@@ -202,7 +202,7 @@ def holds_table(source: str | Path) -> bool:
 
 def read_table(
     source: str | Path,
-    convention: Convention = "standard",
+    convention: Convention | None = None,
     *,
     length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit | None = None,
@@ -213,7 +213,7 @@ def read_table(
     Parameters
     ----------
     source : a file (CSV, Markdown, LaTeX, HTML, MATLAB, Python, JSON, YAML, text), or the table itself as a text
-    convention : standard or modified D-H, unless the table itself says which
+    convention : standard or modified D-H, unless the table itself says which; None means standard if it can be
     length_unit, angle_unit : ``mm``, ``cm``, ``m``, ``in``; ``deg``, ``rad``, where the table says none
     columns : what the columns mean, in their order, where their headings don't say it, such as
         ``["theta", "d", "a", "alpha"]``; ``-`` is not read

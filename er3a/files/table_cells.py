@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from html.parser import HTMLParser
 
-from er3a.files.arithmetic import plain
+from er3a.files.arithmetic import plain, words_of
 
 Row = tuple[int, list[str]]
 """The number of a line in the text, and its cells."""
@@ -28,17 +28,12 @@ _LATEX = (
     ),
     (r"\\(?:SI|qty)\s*\{([^{}]*)\}\s*\{([^{}]*)\}", r"\1 \2"),
     (r"\\ang\s*\{([^{}]*)\}", r"\1°"),
-    (r"\^\s*\{?\s*\\circ\s*\}?|\\(?:text)?degrees?\b|\\circ\b", "°"),
-    (r"\\milli\s*\\met(?:re|er)|\\mm\b", "mm"),
-    (r"\\met(?:re|er)\b", "m"),
-    (r"\\radians?\b", "rad"),
-    (r"\\(?:var)?theta", "θ"),
-    (r"\\alpha", "α"),
-    (r"\\beta", "β"),
-    (r"\\approx", "≈"),
-    (r"\\pi(?![a-z])", "π"),
-    (r"\\(?:cdot|times|ast)\b", "*"),
+    (r"\^\s*\{?\s*\\circ\s*\}?", "°"),
     (r"\\[()\[\],;!: ]|\$|~|\\q?quad", " "),
+)
+_SYMBOLS = words_of(
+    "theta=θ vartheta=θ alpha=α beta=β pi=π approx=≈ cdot=* times=* ast=* circ=° degree=° degrees=° textdegree=° "
+    "mm=mm milli=m metre=m meter=m radian=rad radians=rad"
 )
 _FRACTION = re.compile(r"\\[dt]?frac\s*(?:\{([^{}]*)\}|(\\?\w))\s*(?:\{([^{}]*)\}|(\w))")
 _FUNCTION = re.compile(r"\\(sqrt|sin|cos|arctan|arcsin|arccos)\s*(?:\{([^{}]*)\})?")
@@ -60,6 +55,7 @@ def without_latex(text: str) -> str:
         return text
     for pattern, plainly in _LATEX:
         text = re.sub(pattern, plainly, text)
+    text = re.sub(r"\\([a-z]+)", lambda found: _SYMBOLS.get(found[1], found[0]), text)
     for _ in range(4):
         text = _FRACTION.sub(lambda found: f"({found[1] or found[2]})/({found[3] or found[4]})", text)
         text = _FUNCTION.sub(lambda found: f"{found[1]}({found[2]})" if found[2] else found[1], text)

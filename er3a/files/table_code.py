@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import NoReturn
 
 from er3a.errors import InputError
+from er3a.files.arithmetic import words_of
 from er3a.files.code_brackets import CodeGroup, groups_of, parts
 from er3a.files.table_cells import Grid
 from er3a.files.table_headings import heading_of, quantities_of
@@ -29,14 +31,11 @@ _TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
 _FIELD = r"(?:(?:double|float|\w+_t)\s+)?(\w+)\s*(?:;|:\s*(?:float|f32|f64|double)\b)"
 _TYPE = re.compile(rf"(?:struct|class)\s+(\w*)[^{{}}\n]*[{{:]?\s*(?:(?:{_FIELD})[^\n]*\s*){{3,8}}(?:\}}\s*(\w*))?")
 """A type whose fields are numbers: in C its name may follow."""
-_OF_LINK = "theta", "d", "a", "alpha", "sigma", "offset"
-_ORDERS = {
-    "dhlink": ("d", "alpha", "theta", "a", "sigma"),
-    "revolutedh": ("d", "a", "alpha", "offset"),
-    "revolutemdh": ("d", "a", "alpha", "offset"),
-    "prismaticdh": ("theta", "a", "alpha", "offset"),
-    "prismaticmdh": ("theta", "a", "alpha", "offset"),
-}
+_OF_LINK = [*words_of("theta d a alpha sigma offset")]
+_ORDERS = words_of(
+    "dhlink=d,alpha,theta,a,sigma revolutedh=d,a,alpha,offset revolutemdh=d,a,alpha,offset "
+    "prismaticdh=theta,a,alpha,offset prismaticmdh=theta,a,alpha,offset"
+)
 """The order of arguments without names, by the function."""
 LIBRARIES = {
     "SerialLink": ("theta,d,a,alpha,type,offset", ""),
@@ -87,16 +86,24 @@ class Code:
         """The number of the line of a place in the text."""
         return self.text.count("\n", 0, place) + 1
 
+    def refuse(self, place: int, text: str, problem: str, remedy: str) -> NoReturn:
+        """Refuse a passage, which is quoted."""
+        raise InputError(None, f"line {self.line(place)}", f"'{' '.join(text.split())[:60]}' {problem}", remedy)
+
 
 def row_cells(text: str) -> list[str]:
     """The elements of a list, with commas or, as MATLAB takes them, blanks between them."""
     cells = parts(text)
-    if len(cells) == 1:
-        text = re.sub(r"\s*([*/^])\s*", r"\1", text.strip())
-        text = re.sub(r"(?<=[\w)\]])\s+([-+])\s+", r"\1", text)
-        text = re.sub(r"[(\[{][^()\[\]{}]*[)\]}]", lambda found: found[0].replace(" ", ""), text)
-        cells = text.split()
+    if len(cells) == 1 or not re.search("[\"']", text):
+        cells = [each for part in parts(_closed_up(text)) for each in part.split() or [""]]
     return [cell.strip("\"'") for cell in (cells if cells[-1:] != [""] else cells[:-1])]
+
+
+def _closed_up(text: str) -> str:
+    """A list without the blanks within its elements."""
+    text = re.sub(r"[ \t]*([*/^])[ \t]*|(?<=[\w)\]])[ \t]+([-+])[ \t]+", r"\1\2", text.strip())
+    text = re.sub(r"(^|[,;\n])([ \t]*[-+])[ \t]+", r"\1\2", text)
+    return re.sub(r"[(\[{][^()\[\]{}]*[)\]}]", lambda found: found[0].replace(" ", ""), text)
 
 
 def _rows(code: Code, group: CodeGroup) -> Grid:
@@ -143,15 +150,16 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
     links, runs = _calls(code)
-    if links := links or _records(code):
-        _check_runs(code, runs, links)
-        return links
+    links = links or _records(code)
     named = [grid for grid in matrices if grid[0][1]]
-    written = named or _vectors(code)
-    _check_runs(code, runs, written)
-    for group in code.groups if written else ():
-        _check_kept(code, group, bool(named))
-    return written
+    found = links or named or _vectors(code)
+    _check_runs(code, runs, found)
+    if found and not links:
+        for group in code.groups:
+            _check_kept(code, group, bool(named))
+        if moved := re.search(_TURNED, code.text):
+            code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
+    return found
 
 
 _CONSTANT = {"a", "alpha", "d", "offset"}
@@ -170,9 +178,8 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
         return
     changes = [found for found in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(found, name)]
     for change in [*_MOVED.finditer(group.before), *changes]:
-        problem = f"'{change[0].strip(' ;')[:60]}' changes '{name}'"
-        line = code.line(change.end() if change in changes else group.start)
-        raise InputError(None, f"line {line}", problem, "Write what the program makes of it")
+        place = change.end() if change in changes else group.start
+        code.refuse(place, change[0].strip(" ;"), f"changes '{name}'", "Write what the program makes of it")
 
 
 def _puts_in(found: re.Match[str], name: str) -> bool:
@@ -181,7 +188,7 @@ def _puts_in(found: re.Match[str], name: str) -> bool:
     place, given = found.groups()
     value = re.sub(r"[\[(][\w:, +-]*[\])]", "", given or "")  # without indices
     if place:
-        return bool(re.search(r"[-\d\[{]", value))
+        return bool(re.search(r"-|(?<!\w)\d|[\[{]", value))
     own = re.search(rf"(?<![\w.])(?:self\.)?{name}\b", value)
     return given is None or bool(own and not _CONVERTED.match(given))
 
@@ -192,6 +199,7 @@ _SET = (
 )
 """A statement that puts something into a list, or gives its name to something else."""
 _CONVERTED = re.compile(r"\s*(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\(", re.I)
+_TURNED = r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*)?[-+].*(?:pi|\d).*"
 _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)
 
 
@@ -205,7 +213,7 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
     records = 0
     for each in code.groups:
         if each.bracket == "{" and _is_row(cells := _record(each)):
-            rows.append(_Link(code.line(each.start), "", each.start, cells))
+            rows.append(_Link("", each.start, cells))
             records += 1
             continue
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
@@ -226,28 +234,30 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
             )
             if added and named[1] is None:
                 target = f"{added[1]}[{each.start}"
-            rows.append(_Link(code.line(each.start), target, each.start, cells))
+            rows.append(_Link(target, each.start, cells))
         elif not cells and toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
             unread.append(each)
     if "Frame::DH(" in code.text:
         _segments(code, rows, runs)
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
-        problem = f"'{' '.join(unread[0].inside.split())[:60]}' can't be read as a link"
-        remedy = "Write its numbers there, or the matrix that they come from above it"
-        raise InputError(None, f"line {code.line(unread[0].start)}", problem, remedy)
+        code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
     looped = re.search(r"\bfor\b", code.text) and len(rows) == 1
     if len(rows) > records and (re.search(_ADDED, code.text) or looped or runs):
-        problem = f"'{', '.join(texts)[:60]}': links of another program, or of a loop, are added"
-        raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
+        code.refuse(rows[0].place, ", ".join(texts), *_OF_LOOP)
     names = {row.name: row for row in rows}
     chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in code.groups if each.bracket == "["]
     arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups if each.bracket in "[{"]
     held = [each for each in held if len(each) > 1]
-    held = arms or [each for one in held or [rows] for each in _begun_again(one)]
-    return [_grid([(row.line, row.cells) for row in each]) for each in held if each], runs
+    taken = [row for each in arms for row in each]
+    held = [each for one in held or [rows] for each in _begun_again(one)]
+    arms += [each for each in held if not taken or (_list_of(each[0]) and each[0] not in taken)]
+    return [_grid([(code.line(row.place), row.cells) for row in each]) for each in arms if each], runs
+
+
+_OF_LOOP = ("is of a loop, or of another program", "Write a row for each joint")
 
 
 def _record(group: CodeGroup) -> dict[str, str]:
@@ -255,8 +265,8 @@ def _record(group: CodeGroup) -> dict[str, str]:
     if re.search(r"\b(?:struct|class|interface|type)\s+\w[^;={}]*$", group.before):
         return {}
     label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", group.before)
-    pairs = _pairs(parts(group.inside)).items()
-    cells = {key: value for key, value in pairs if not re.match(r"[(\[].*,", value)}  # no colour, no column
+    # No colour, no column.
+    cells = {key: value for key, value in _pairs(parts(group.inside)).items() if not re.match(r"[(\[].*,", value)}
     return ({"joint": label[1]} if label else {}) | cells
 
 
@@ -289,8 +299,7 @@ def _check_taken(code: Code, call: CodeGroup, cells: dict[str, str]) -> None:
         words = re.findall(r"[^\W\d]\w*", taken[1]) if taken else [""]
         own = taken and (_ELEMENT.fullmatch(taken[1]) or words[-1] in lists)
         if not own and [_place(each) for each in words[-1:] if heading_of(each)] != [_place(name)]:
-            problem = f"'{cell}' is worked out for each link"
-            raise InputError(None, f"line {code.line(call.start)}", problem, "Write a row for each joint")
+            code.refuse(call.start, cell, *_OF_LOOP)
 
 
 def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
@@ -304,14 +313,17 @@ def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
     left_out = not given & {"offset", "theta", "row"} and any(map(_turns, grids))  # offsets that no link takes
     if grids and not left_out and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
         return
-    problem = f"'{' '.join(runs[0].inside.split())[:60]}': links of another program, or of a loop, are added"
-    raise InputError(None, f"line {code.line(runs[0].start)}", problem, "Write a row for each joint")
+    code.refuse(runs[0].start, runs[0].inside, *_OF_LOOP)
 
 
 def _turns(grid: Grid) -> bool:
     """Whether a table has angles theta, or offsets, that are not 0."""
-    columns = zip(grid[0][1], zip(*(cells for _, cells in grid[1:])))
-    cells = [cell for name, column in columns if heading_of(name) and _place(name) == "theta" for cell in column]
+    cells = [
+        cell
+        for name, column in zip(grid[0][1], zip(*(cells for _, cells in grid[1:])))
+        if heading_of(name) and _place(name) == "theta"
+        for cell in column
+    ]
     return bool(re.search(r"[1-9]|pi|π", " ".join(cells), re.I))
 
 
@@ -340,9 +352,8 @@ def _segments(code: Code, rows: list[_Link], runs: list[CodeGroup]) -> None:
             if kinds == ["RotZ"] and any(each.start < run.start < each.end for run in runs):
                 continue
             if row is None or len(kinds) != 1:
-                problem = f"the segment '{' '.join(each.inside.split())[:60]}' is no row of a table"
                 remedy = "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out"
-                raise InputError(None, f"line {code.line(each.start)}", problem, remedy)
+                code.refuse(each.start, each.inside, "is no row of a table", remedy)
             row.cells.update(type=_KDL[kinds[0]], convention="standard")
 
 
@@ -356,8 +367,8 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     orders = {"DH": ["a", "alpha", "d", "offset"]} if "Frame::DH(" in code.text else {}
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
-        found = quantities_of(names)
-        if each.bracket != "{" and named and len(found) == 4 and {"theta", "d", "a", "alpha"} == {*map(_place, found)}:
+        alike = sorted(map(_place, quantities_of(names))) == ["a", "alpha", "d", "theta"]
+        if alike and named and each.bracket != "{":
             made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
             orders.setdefault(made[-1] if made else "", names)
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
@@ -378,11 +389,8 @@ def _of_signature(order: list[str], text: str) -> dict[str, str]:
 def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
     """Whether a row holds numbers or names of numbers, and no elements of lists."""
     texts = _constants(cells)
-    if any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)|\bc\(", cell) for cell in texts):
-        return False
-    given = r"(?m)^\s*{}\s*=[^\[{{\n]+$"
-    return any(
-        not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(given.format(re.escape(cell)), code.text)
+    return not any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)|\bc\(", cell) for cell in texts) and any(
+        not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(rf"(?m)^\s*{re.escape(cell)}\s*=[^\[{{\n]+$", code.text)
         for cell in texts
     )
 
@@ -394,7 +402,6 @@ def _constants(cells: dict[str, str]) -> list[str]:
 
 @dataclass(frozen=True)
 class _Link:
-    line: int
     name: str
     place: int
     cells: dict[str, str]
@@ -402,11 +409,10 @@ class _Link:
 
 def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
     """Links by the arms that they belong to: a name that is used again begins another arm, another list does too."""
-    arms: list[list[_Link]] = []
+    arms: list[list[_Link]] = [[]]
     for row in rows:
-        last = arms[-1] if arms else []
-        again = row.name and any(row.name == other.name for other in last)
-        if again or not last or _list_of(row) != _list_of(last[-1]):
+        last = arms[-1]
+        if last and (row.name in {other.name for other in last} - {""} or _list_of(row) != _list_of(last[-1])):
             arms.append([])
         arms[-1].append(row)
     return arms
@@ -438,14 +444,14 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
     if toolbox is None:
         return cells if _is_row(cells) and not given else None
     if len(given) == 1 and given[0].startswith("["):
-        order = ("alpha", "a", "theta", "d", "sigma") if function == "link" else _OF_LINK
+        order = words_of("alpha a theta d sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
         if len(given) < 4:
             whole = given and _ELEMENT.fullmatch(given[0]) and not "".join(given[1:]).strip("0.")
             return {"row": given[0]} if whole else None
         cells |= dict(zip(order, given))
-    elif low in _ORDERS and len(given) <= len(_ORDERS[low]):
-        cells |= dict(zip(_ORDERS[low], given))
+    elif low in _ORDERS and len(given) <= len(order := _ORDERS[low].split(",")):
+        cells |= dict(zip(order, given))
     elif given or (low == "link" and not cells):
         return None
     return _of_toolbox(low, words, cells)
@@ -463,31 +469,29 @@ _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismati
 
 def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[str, str]:
     """A row of a toolbox: what is left out is 0; theta of a joint that turns, and d of one that slides, is its own."""
-    slides = "prismatic" in (*words, *re.findall("prismatic", function)) or cells.get("sigma", "0") in ("1", "1.0")
+    words += [flag for flag in ("mdh", "flip") if cells.pop(flag, "0").lower() in ("1", "true")]
+    said = " ".join([function, *words])
+    slides = "prismatic" in said or cells.get("sigma", "0") in ("1", "1.0")
     slides |= function == "link" and "theta" in cells and "d" not in cells
-    modified = "mdh" in function or bool({"modified", "mod", "mdh", "moddh"} & {*words})
-    modified |= cells.pop("mdh", "0").lower() in ("1", "true")
     offset = cells.pop("offset", "0")
-    flipped = "flip" in words or cells.pop("flip", "").lower() in ("1", "true")
     row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
     row |= {"offset": "" if slides else offset, "type": "prismatic" if slides else "revolute"}
     if slides and offset != "0":
         row["d"] = f"{row['d']}+{offset}"
-    row |= {"convention": "modified" if modified else "standard"}
-    return row | {"direction": "-1"} if flipped else row
+    row["convention"] = "modified" if re.search("mod|mdh", said) else "standard"
+    return row | {"direction": "-1"} if "flip" in words else row
 
 
 def _assigned(code: Code, rows: list[_Link]) -> None:
     """Carry out what is set after a link was made: ``L(2).offset = -pi/2``."""
     pattern = r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\s*=(?!=)\s*([^;\n]+)"
     for found in re.finditer(pattern, code.text) if rows else ():
-        cells = next((row.cells for row in rows if row.name == found[1]), None)
-        if cells is None or found[2] not in cells:
-            if found[1] == "self":
-                continue
-            problem = f"{found[1]}.{found[2]} is set for a link that is not found"
-            raise InputError(None, f"line {code.line(found.start())}", problem, "Write it into the link's call")
-        cells[found[2]] = found[3].strip()
+        name = f"{found[1]}.{found[2]}"
+        given = [(row, key) for row in rows for key, cell in row.cells.items() if name in (cell, f"{row.name}.{key}")]
+        for row, key in given:
+            row.cells[key] = found[3].strip()
+        if not given and found[1] != "self":
+            code.refuse(found.start(), name, "is set for a link that is not found", "Write it into the link's call")
 
 
 def _is_row(cells: Iterable[str]) -> bool:
@@ -519,8 +523,8 @@ def _records(code: Code) -> list[Grid]:
 
 def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
     header = list(dict.fromkeys(key for _, cells in rows for key in cells))
-    blank = {"direction": "1"}
-    return [(0, header), *((line, [cells.get(key, blank.get(key, "")) for key in header]) for line, cells in rows)]
+    blank = ["1" if key == "direction" else "" for key in header]
+    return [(0, header), *((line, [*map(cells.get, header, blank)]) for line, cells in rows)]
 
 
 # Matrices and lists ---------------------------------------------------------------------------------------------------
@@ -531,12 +535,12 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
     rows = _rows(code, group)
     if len(rows) < 2 or any(re.match(r"[\[{]|\([^()]*,|.*:|-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for cell in rows[0][1]):
         return []
-    pose = len(rows) == 4 and re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1]))
-    if pose or len({len(cells) for _, cells in rows}) > 1:
+    if len(rows) == 4 and re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):  # a pose
         return []
     several = len({line for line, _ in rows}) == len(rows)
     labels = [code.comments.get(line, "") if several else "" for line, _ in rows]
-    return _titled(code, rows, labels, group.before) if 3 <= len(rows[0][1]) <= 8 else []
+    widths = {len(cells) for _, cells in rows}
+    return _titled(code, rows, labels, group.before) if len(widths) == 1 and 3 <= min(widths) <= 8 else []
 
 
 def _listed(code: Code) -> Grid:
@@ -554,8 +558,8 @@ def _listed(code: Code) -> Grid:
             continue
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
-            numbers = 4 <= len(cells) <= 8 and all(re.search(r"\d|pi|π", cell) for cell in cells)
-            if numbers and len(cells) == len((rows or [(0, cells)])[0][1]):
+            alike = len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= 8
+            if alike and all(re.search(r"\d|pi|π", cell) for cell in cells):
                 rows.append((code.line(group.start), cells))
                 labels.append(label[1] or label[2] or "")
                 arms.add((label[2] or "").rstrip("0123456789"))
@@ -581,7 +585,12 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     of a library."""
     width = len(rows[0][1])
     lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
-    typed = [code.orders[name] for name in code.fields.keys() & code.orders if re.search(rf"\b{name}\b", before)]
+    typed = [
+        names
+        for name, names in code.orders.items()
+        if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
+        or (name in code.fields and re.search(rf"\b{name}\b", before))
+    ]
     near = next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
     used = _columns_in(
         [
@@ -613,9 +622,9 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     """The names of columns that texts hold one after the other; [] if they hold several orders."""
     found: dict[str, list[str]] = {}
     for text in texts:
-        text = re.sub(r"\b(?:joint_?)?type\b", "sigma", text)
+        text = re.sub(r"(?<=,)(\s*)_(?=,|$)", r"\1theta", re.sub(r"\b(?:joint_?)?type\b", "sigma", text))
         text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
-        words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->)+", text) if word]
+        words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text) if word]
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
         # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
         names = next((each for each in windows if _names_columns(each, once=len(each) > width)), [])
@@ -628,8 +637,11 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
 def _zipped(code: Code) -> dict[str, str]:
     """The list that each variable of a loop over ``zip`` goes through, as its element."""
     loops = re.findall(r"\bfor\s+([\w, ()]+?)\s+in\s+(?:enumerate\()?zip\(([\w., ]+)\)", code.text)
-    pairs = [zip(re.findall(r"\w+", names)[::-1], re.findall(r"[\w.]+", lists)[::-1]) for names, lists in loops]
-    return {name: f"{one}[i]" for each in pairs for name, one in each}
+    return {
+        name: f"{one}[i]"
+        for names, lists in loops
+        for name, one in zip(re.findall(r"\w+", names)[::-1], re.findall(r"[\w.]+", lists)[::-1])
+    }
 
 
 def _given_to(code: Code, *, toolbox: bool = False) -> Iterator[tuple[str, str]]:
@@ -647,8 +659,9 @@ def _given_to(code: Code, *, toolbox: bool = False) -> Iterator[tuple[str, str]]
 
 def _indexed(code: Code) -> Iterator[str]:
     """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
-    made = [f"{name}={part}" for name, part in _given_to(code)]
-    if any(name == "row" for name, _ in _given_to(code)):
+    given = [*_given_to(code)]
+    made = [f"{name}={part}" for name, part in given]
+    if "row" in dict(given):
         yield from (",".join(_OF_LINK[:width]) for width in (4, 5, 6))
     found: dict[str, dict[int, str]] = {}
     pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"
@@ -674,7 +687,8 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
-            r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(", re.sub(r"\w\[[^\[\]]*\]", "q", inside)
+            r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
+            re.sub(r"\w\[[^\[\]]*\]", "q", _closed_up(inside)),
         )
         if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
             continue
@@ -697,7 +711,7 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
     header, line, places = dict[str, str](), 0, dict[str, tuple[int, str]]()
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
-        names = (taken.get(name, "-"),) if taken else (name, bare, name.rpartition("_")[2])
+        names = (taken.get(name, "-"),) if taken else (name, bare, bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
         if heading and heading.quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
             continue  # values of joints, or their limits
@@ -711,25 +725,30 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
         of_others = name in "Ll" and "a" in named and places["a"][1] not in "rR"
         if quantity not in _OF_VECTORS or not cells or of_others:
             continue
-        header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
+        header[quantity] = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
         places.setdefault(quantity, (line, name))
         if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
-            first, other = places[quantity]
-            problem = f"'{name}' is another list of {quantity} than '{other}' of line {first}"
+            problem = (
+                f"'{name}' is another list of {quantity} than '{places[quantity][1]}' of line {places[quantity][0]}"
+            )
             raise InputError(None, f"line {line}", problem, "Give the lists of one arm, each with its own name")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
     if named.pop("pose", None) and "theta" not in named:
         line, name = places["pose"]
-        problem = f"'{name}' may be offsets of the joints' angles, or a pose"
-        raise InputError(None, f"line {line}", problem, "Name it offset if theta = q + offset, or remove it")
+        raise InputError(
+            None,
+            f"line {line}",
+            f"'{name}' may be offsets of the joints' angles, or a pose",
+            "Name it offset if theta = q + offset, or remove it",
+        )
     if len({len(cells) for cells in named.values()}) > 1:
         problem = f"different numbers of entries: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
         raise InputError(None, f"line {line}", problem, "Give one for each joint")
     return [[(0, [header[name] for name in named]), *((1, list(row)) for row in zip(*named.values()))]]
 
 
-_OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
+_OF_VECTORS = words_of("a alpha d theta offset type direction pose")
 
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
@@ -747,11 +766,11 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     for name, entries in found.items():
         last, cells = entries[max(entries)], {k: each[4].strip() for k, each in entries.items()}
         of_link = found["alpha" if name in ("alpha", "a") else "d"]
-        gaps = {*range(min(of_link), max(entries) + 1)} - {*entries}
+        first = min(entries) if len(entries) == len(of_link) else min(of_link)
+        gaps = {*range(first, max(entries) + 1)} - {*entries}
         if gaps and last[3] == ":" and _place(name) == "theta":  # what is not replaced stays a variable
             cells |= {k: f"{name}{k}" for k in gaps}
         elif gaps:
-            problem = f"{name}{min(gaps)} is missing"
-            raise InputError(None, f"line {code.line(last.start())}", problem, "Give one for each joint")
-        before = "(i-1)" if min(of_link) < min(found["d"]) else ""
+            code.refuse(last.start(), f"{name}{min(gaps)}", "is missing", "Give one for each joint")
+        before = "(i-1)" if min(of_link) < max(min(each) for each in found.values()) else ""
         yield name + before, [cells[k] for k in sorted(cells)], code.line(last.start()), last[3]

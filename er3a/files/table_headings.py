@@ -11,18 +11,19 @@ from er3a.files.arithmetic import UNITS, plain, words_of
 
 _JOINT = words_of(
     "joint joints joint# jointi jointno jointno. jointnumber link links link# linki linkno linkno. linknumber axis "
-    "i j n no no. # frame kinematics gelenk achse articulation "
+    "i j n no no. # frame kinematics gelenk achse articulation articulación eslabón junta ジョイント "
     "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
     "a=a r=a l=a d=d q=theta v=theta phi=theta φ=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha "
-    "alph=alpha al=alpha offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset θoff=offset "
-    "thetaoff=offset type=type jointtype=type sigma=type σ=type 类型=type"
+    "alph=alpha al=alpha offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset th0=offset "
+    "θoff=offset thoff=offset thetaoff=offset type=type jointtype=type sigma=type σ=type 类型=type"
 )
 _WORDS = words_of(
-    "angleoffset=offset thetaoffset=offset offsettheta=offset θoffset=offset θ,offset=offset theta,offset=offset "
-    "linklength=a 连杆长=a 杆长=a linkoffset=d jointoffset=d jointdistance=d 偏距=d 偏移=d 偏置=d α=alpha alpha=alpha "
-    "twist=alpha 扭=alpha θ=theta theta=theta jointangle=theta 关节角=theta 转角=theta β=beta beta=beta"
+    "零位=offset 零偏=offset thoffset=offset angleoffset=offset thetaoffset=offset offsettheta=offset θoffset=offset "
+    "θ,offset=offset theta,offset=offset linklength=a 连杆长=a 杆长=a linkoffset=d jointoffset=d jointdistance=d "
+    "偏距=d 偏移=d 偏置=d α=alpha alpha=alpha twist=alpha 扭=alpha θ=theta theta=theta jointangle=theta 关节角=theta "
+    "转角=theta β=beta beta=beta"
 )
 """Each marks a heading that holds it; the first that is found counts."""
 _OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|cm|m|in|deg|rad)")

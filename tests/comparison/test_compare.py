@@ -718,11 +718,20 @@ def test_two_exchanged_rows_are_one_slip():
 
 
 @pytest.mark.long
-def test_the_other_convention_is_named_with_another_wrong_entry():
-    right = irb120()
-    found = er3a.compare(changed(right, "d", {4: 0.332}).replace(convention="modified"), right)
-    assert [each.code for each in found.causes] == ["other_convention"]
-    assert [(each.entry, each.b) for each in found.geometry.differences] == [("d4", 302)]
+@pytest.mark.parametrize(
+    ("name", "entry", "factor"),
+    [("er3_600", "d4", 1.1), ("lrmate200id4sc", "d4", -1), ("ma2010", "alpha1", -1), ("cr7ia", "a1", 1.3)],
+)
+def test_the_table_that_is_tested_is_blamed_for_the_other_convention_with_another_wrong_entry(name, entry, factor):
+    right = er3a.to_standard(er3a.load_robot(name))
+    column, row = entry[:-1], int(entry[-1]) - 1
+    values = np.array(getattr(right, column))
+    values[row] *= factor
+    found = er3a.compare(right.replace(**{column: values, "convention": "modified"}), right)
+    assert ("other_convention", "a") in [(each.code, each.side) for each in found.causes]
+    assert {each.side for each in found.causes} == {"a"}
+    assert [each.entry for each in found.geometry.differences] == [entry]
+    assert er3a.compare(found.corrected, right).verdict == "equal"
 
 
 @pytest.mark.long

@@ -107,7 +107,7 @@ def test_a_cell_that_can_mean_two_things_is_refused(tmp_path, row, told):
 
 def test_offsets_in_two_columns_are_refused(tmp_path):
     (tmp_path / "arm.csv").write_text("i,a,alpha,d,theta,offset\n1,70,90,352,q1-90,90\n", encoding="utf-8")
-    with pytest.raises(InputError, match="another column"):
+    with pytest.raises(InputError, match="offsets too"):
         read_dh_table(tmp_path / "arm.csv", "arm")
 
 

@@ -743,9 +743,9 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         (f"{LINES}L = [{LINK} for i in reversed(range(2))]\n", "of a loop"),
         (f"{LINES}L = []\nfor i in range(2):\n    if i:\n        L.append({LINK})\n", "of a loop"),
         (f"{LINES}L = []\n{2 * f'for i in range(2):{chr(10)}    L.append({LINK}){chr(10)}'}", "of a loop"),
-        (f"{LISTS}L = [RevoluteDH(d=d[i], a=a[i], alpha=alpha[i], offset=-off[i]) for i in range(2)]\n", "worked out"),
-        (f"{RECORDS}L = [RevoluteDH(d=p['a'], a=p['d'], alpha=p['alpha']) for p in dh]\n", "worked out"),
-        (f"{LINES}L = [RevoluteDH(d=d[i], a=a[i], alpha=pi / 2) for i in range(2)]\n", "worked out"),
+        (f"{LISTS}L = [RevoluteDH(d=d[i], a=a[i], alpha=alpha[i], offset=-off[i]) for i in range(2)]\n", "of a loop"),
+        (f"{RECORDS}L = [RevoluteDH(d=p['a'], a=p['d'], alpha=p['alpha']) for p in dh]\n", "of a loop"),
+        (f"{LINES}L = [RevoluteDH(d=d[i], a=a[i], alpha=pi / 2) for i in range(2)]\n", "of a loop"),
         (f"{RECORDS}L = [RevoluteDH(d=p['d'], a=p['a'], alpha=p['alpha']) for p in dh]\n", "of a loop"),
         (f"{MATRIX}DH[1][2] = 0.5\nL = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH]\n", "of a loop"),
         (f"{MATRIX}L = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH[:1]]\n", "of a loop"),
@@ -769,8 +769,14 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         ("d={0.29,0};\na={0,0.27};\nalfa={-pi/2,0};\n\nd{1}=0.29+0.061;\n", "line 5: .* changes 'd'"),
         ("a = [0, 0.27]\nalpha = np.flip([0, -pi/2])\nd = [0.29, 0]\n", "changes 'alpha'"),
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\na.append(0.1)\n", "changes 'a'"),
+        ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\nq[1] = q_s[1] - pi/2\n", "line 4: .* changes theta"),
         ("L(1)=Link('d',0.29,'a',0,'alpha',0);\nL(2)=L(1);\nL(3)=Link('d',0,'a',1,'alpha',0);", "of a loop"),
         ("L = [RevoluteDH(d=0.29, alpha=pi/2)] * 2 + [RevoluteDH(a=0.3)]\n", "of a loop"),
+        (
+            "L1 = Link('d',1,'a',0,'alpha',0);\nL2 = Link('d',0,'a',2,'alpha',0);\nSerialLink([L1 L2]);\n"
+            "E(1) = Revolute('d',3,'a',0,'alpha',0);\nE(2) = Revolute('d',0,'a',4,'alpha',0);\n",
+            "2 D-H tables",
+        ),
         ("c.addSegment(Segment(Joint(Joint::RotX), Frame::DH(0, 0, 0.29, 0)));\n", "RotX.*RotZ, TransZ or None"),
         (
             "c.addSegment(Segment(Joint(Joint::RotZ), Frame::DH(0, 0, 1, 0)));\nc.addSegment(Segment(fixed, H));",
@@ -806,6 +812,7 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "var Arm = Params{\n\tThetaOffsets: []float64{0, -math.Pi / 2},\n\tAlphaValues: []float64{-math.Pi / 2, 0},\n"
         "\tAValues: []float64{0, 270},\n\tDValues: []float64{290, 0},\n}\n",
         "alphas = [-np.pi/2, 0]\na_vals = [0, 270]\nd_values = [290, 0]\ntheta_offsets = [0, -np.pi/2]\n",
+        "ar_alpha_vals = [-np.pi/2, 0]\nar_a_vals = [0, 270]\nar_d_vals = [290, 0]\nar_theta_offsets = [0, -np.pi/2]\n",
         "double a1=0,alpha1=-std::numbers::pi/2,d1=290,offset1=0;\n"
         "double a2=270,alpha2=0,d2=0,offset2=-std::numbers::pi/2;\n",
         '"""Matrices (rx, tx, rz, tz) aka (alpha, a, theta, d)"""\n\n\n\n\n\n\ndef arm():\n    return np.array([\n'
@@ -818,8 +825,44 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "| i | a (mm) | alpha (deg) | d (mm) | offset (deg) | note |\n|--|--|--|--|--|--|\n"
         "| 1 | 0 | -90 | 290 | 0 | As given: theta=0, alpha=-90deg, d=L1, a=0. |\n"
         "| 2 | 270 | 0 | 0 | -90 | As given: theta=-90deg, alpha=0, d=0, a=L2. |\n",
+        "% L(1) = Link('d', 290, 'a', 0, 'alpha', -pi/2);\n"
+        "% L(2) = Link('d', 0, 'a', 270, 'alpha', 0, 'offset', -pi/2);\n",
+        "part{1}.a = 0; part{1}.alpha = -pi/2; part{1}.d = 290;\npart{2}.a = 270; part{2}.alpha = 0; part{2}.d = 0;\n"
+        "L = [Revolute('d', part{1}.d, 'a', part{1}.a, 'alpha', part{1}.alpha)\n"
+        "Revolute('d', part{2}.d, 'a', part{2}.a, 'alpha', part{2}.alpha, 'offset', -pi/2)];\n",
+        "i | a | alpha | d | theta\n--|--|--|--|--\n1 | 0|-pi/2|290|q1|\n2 | 270|0|0|q2 - pi/2|\n",
+        "| i | a | alpha | d | theta |\n|--|--|--|--|--|\n| 1 | 0 | -pi/2 | d1 | q1 |\n"
+        "| 2 | a2 | 0 | 0 | q2 - pi/2 |\n\n"
+        "- d1 = 290: from the drawing\n- a2 = 270: from the drawing\n",
+        "a = [0; 270];\nd = [290; 0];\nalpha = [-pi/2; 0];\ntheta = [q1; q2 - (90 + 90)*pi/360];\n",
+        "% alpha, a, d, and theta\nDH = [-pi/2 0, 290 0;\n      0, 270 0, -pi/2];\n",
+        "def row(d, a, alpha, theta):\n    return np.eye(4)\ndh = [(290, 0, -pi/2, q1), (0, 270, 0, q2 - pi/2)]\n"
+        "for each in dh:\n    T = T @ row(*each)\n",
+        "float a_[2] = {0, 270};\nfloat alpha_[2] = {-90, 0};\nfloat d_[2] = {290, 0};\nfloat th0_[2] = {0, -90};\n",
+        "| i | α (°) | a (mm) | d (mm) | θ | θ 零位偏移 (°) |\n|--|--|--|--|--|--|\n"
+        "| 1 | -90 | 0 | 290 | θ1 | 0 (朝前) |\n| 2 | 0 | 270 | 0 | θ2 | -90 (竖直) |\n",
     ],
 )
 def test_names_and_places_that_programs_give_a_table_are_read(tmp_path, text):
     content, _ = read(tmp_path, text)
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-6)
+
+
+CRAIG = "joint,a,alpha,d,theta\n1,0,0,333,q1\n2,0,-90,0,q2\n3,82,90,316,q3\n4,-82,90,0,q4\n"
+
+
+def test_a_convention_by_which_two_joints_turn_about_one_line_is_asked_back(tmp_path):
+    path = tmp_path / "arm.csv"
+    path.write_text(CRAIG)
+    with pytest.raises(InputError, match="joints 1 and 2 turn about one line"):
+        read_dh_table(path, "arm")
+    assert read_dh_table(path, "arm", "standard")[0].dh.convention == "standard"  # said, so it is meant
+    assert read_dh_table(path, "arm", as_printed=True)[0].dh.convention == "standard"  # a comparison names the other
+    assert read(tmp_path, "Modified DH\n" + CRAIG)[0].dh.convention == "modified"
+    # As modified rows joints 3 and 4 would turn about one line, too: nothing to choose between.
+    assert read(tmp_path, CRAIG.replace("4,-82,90", "4,0,0"))[0].dh.convention == "standard"
+
+
+def test_lists_d_and_r_as_khalil_names_them_are_asked_back(tmp_path):
+    with pytest.raises(InputError, match="either can be the link's length"):
+        read(tmp_path, "alpha = [0 -pi/2 0];\nd = [0 0 265];\nr = [159 0 0];\n")

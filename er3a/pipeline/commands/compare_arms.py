@@ -13,7 +13,7 @@ import typer
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM, Tolerances
 from er3a.errors import DoubtfulUnit, Er3aError
 from er3a.finding import plain
-from er3a.pipeline.commands.dh_options import Angles, Lengths
+from er3a.pipeline.commands.dh_options import Angles, Conventions, Lengths
 from er3a.pipeline.commands.options import (
     ROBOT_FILES,
     AsJson,
@@ -27,7 +27,7 @@ from er3a.pipeline.commands.options import (
     print_note,
     print_table,
 )
-from er3a.robots.robot import Convention, Robot
+from er3a.robots.robot import Robot
 
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
@@ -75,7 +75,7 @@ def compare(
         ),
     ] = None,
     *,
-    convention: Annotated[Convention, typer.Option(help="D-H convention of tables")] = "standard",
+    convention: Conventions = None,
     length_unit: Lengths = None,
     angle_unit: Angles = None,
     column: Columns = None,

@@ -12,11 +12,10 @@ import typer
 from er3a.errors import Er3aError
 from er3a.pipeline import language
 from er3a.pipeline.commands import options
-from er3a.pipeline.commands.dh_options import Angles, Lengths
+from er3a.pipeline.commands.dh_options import Angles, Conventions, Lengths
 from er3a.pipeline.results import is_current, write_checksum
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
-from er3a.robots.robot import Convention
 
 TEACH = "teach"
 
@@ -114,7 +113,7 @@ def teach(
         Path | None, typer.Option(help="the page to write, if ROBOT is a file (default: NAME.html)")
     ] = None,
     *,
-    convention: Annotated[Convention, typer.Option(help="of a D-H table")] = "standard",
+    convention: Conventions = None,
     length_unit: Lengths = None,
     angle_unit: Angles = None,
     base: options.Base = None,

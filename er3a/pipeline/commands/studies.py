@@ -17,11 +17,10 @@ import typer
 from er3a.errors import Er3aError, ResultError
 from er3a.files.kept_files import write_text
 from er3a.pipeline.commands import options
-from er3a.pipeline.commands.dh_options import Angles, Lengths
+from er3a.pipeline.commands.dh_options import Angles, Conventions, Lengths
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
-from er3a.robots.robot import Convention
 
 if TYPE_CHECKING:
     from er3a.pipeline.verdicts import StageVerdict
@@ -36,7 +35,7 @@ def new(
         typer.Option("--robot", "--urdf", "--dh", help="the arm: a robot's name or file, a URDF or xacro, a D-H table"),
     ],
     name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: its file's)")] = None,
-    convention: Annotated[Convention, typer.Option(help="D-H convention of a table")] = "standard",
+    convention: Conventions = None,
     length_unit: Lengths = None,
     angle_unit: Angles = None,
     column: options.Columns = None,
