@@ -130,7 +130,8 @@ function draw() {
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && (touching.has(mesh.shape.name) ? SEEN_THROUGH : FAINT));
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
-  if (!atRest(motion.trails[0])) for (const trail of motion.trails) space.line(trail, page.ink, 2);
+  const moves = motion.trails[0].some((point) => Math.hypot(...subtract(point, motion.trails[0][0])) >= CLOSED * data.size);
+  for (const trail of moves ? motion.trails : []) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
     if (status === "plain" || from >= Math.min(until, end())) continue;
     const times = [from, ...motion.times.filter((time) => time > from && time < until), Math.min(until, end())];
@@ -155,7 +156,7 @@ function draw() {
   for (const [j, { status }] of failing()) {
     if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
   }
-  if (arms.length === 1) nameEnds(motion.trails[0]);
+  if (moves && arms.length === 1) nameEnds(motion.trails[0]);
   data.signs.forEach(({ text, at }, k) => space.word(text, wrong ? column(poses[k][3], 3) : at, k === 0 && wrong ? page.touching : page.ink));
   space.names(surroundings, touching);
   space.end();
@@ -192,13 +193,8 @@ function tellLoads(poses) {
   });
 }
 
-function atRest(trail) {
-  return trail.every((point) => Math.hypot(...subtract(point, trail[0])) < CLOSED * data.size);
-}
-
 function nameEnds(trail) {
   const [first, last] = [trail[0], trail.at(-1)];
-  if (atRest(trail)) return;
   const closed = Math.hypot(...subtract(last, first)) < CLOSED * data.size;
   const arrives = whole() - end() < ROUNDED;
   for (const [at, text] of closed ? [[first, words.start_and_end]] : [[first, words.start], ...(arrives ? [[last, words.end]] : [])]) {
