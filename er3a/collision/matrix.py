@@ -3,7 +3,9 @@
 As MoveIt's setup assistant has it, but that "never" is proven:
 
 - *joined*: a joint joins the two: no link with a shape is between them, or they are at most ``ACROSS`` joints apart
-  and overlap in all joint vectors drawn (``TRIED``), as across a wrist. Hulls and surfaces are not checked then. Of
+  and overlap in all joint vectors drawn (``TRIED``), as across a wrist. Hulls and surfaces are not checked then, nor
+  those that stay within ``PLAY`` of each other there: what rubs at each joint value is a bearing, and whether it
+  touches by the rounding of a mesh's corners says nothing. Of
   capsules the region around the joint is left out, within the girth of both, from where they are nearest in the pose
   in which they are farthest apart. The rest is checked, so that an arm that folds onto itself is seen;
 - *overlaps*: they overlap in all joint vectors drawn and no joint explains it. No arm is built like that, so the shapes
@@ -29,7 +31,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.distances import FREE, MEETS, measure, search_boxes, some_distances, which_overlap
+from er3a.collision.distances import FREE, MEETS, Layout, measure, search_boxes, some_distances, which_overlap
 from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED, link_label
 from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_body
@@ -41,6 +43,8 @@ PairState = Literal["never", "joined", "overlaps", "guessed", "meets", "undecide
 
 ACROSS = 2  # joints that a wrist's housing hides
 POOR_GUESS = 0.1  # of the joint vectors drawn
+FEW = 8
+PLAY = 1e-3  # m, between housings that turn in each other
 BOXES = 50_000
 BOXES_OF_SURFACES = 2_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
@@ -152,8 +156,10 @@ def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[Bo
     near, share = neighbours or outer.link - inner.link <= ACROSS, float(overlap.any(axis=1).mean())
     if share == 1.0 and not near:
         return MatrixRow(*names, "overlaps", q[0]), []
-    if share == 1.0:
-        return _joined(robot, pairs, overlap) if capsules else (MatrixRow(*names, "joined"), [])
+    if share == 1.0 and capsules:
+        return _joined(robot, pairs, overlap)
+    if near and not capsules and _within_play(robot, pairs):
+        return MatrixRow(*names, "joined"), []
     if near and share >= POOR_GUESS and not arm_shapes(robot).given:
         return MatrixRow(*names, "guessed"), []
     return _checked(robot, pairs, q, overlap)
@@ -287,18 +293,30 @@ def _searched(robot: Robot, pair: BodyPair, boxes: int) -> tuple[int, Reals, flo
 
 def _distances(robot: Robot, pair: BodyPair) -> Reals:
     """Of two bodies (TRIED,), m, in the joint vectors drawn."""
-    q, found = quasi_random_points(robot.lower, robot.upper, TRIED), np.empty((TRIED, 1))
-    none = np.empty(TRIED), np.empty(TRIED, np.int64), np.empty(TRIED, bool)
-    measure(layout_of(robot, pair, [(0, 1)]), q, found, *none)
-    return found[:, 0]
+    return _least(robot, [pair], TRIED)
+
+
+def _least(robot: Robot, pairs: Sequence[BodyPair], count: int) -> Reals:
+    """The smallest distance of pairs (count,), m, in the first of the joint vectors drawn."""
+    q, found = quasi_random_points(robot.lower, robot.upper, TRIED)[:count], np.empty(count)
+    measure(_layout(robot, pairs), q, np.empty((0, 0)), found, np.empty(count, np.int64), np.empty(count, bool))
+    return found
+
+
+def _within_play(robot: Robot, pairs: Sequence[BodyPair]) -> bool:
+    """Whether bodies are never farther apart than ``PLAY``: most are in one of the first joint vectors drawn."""
+    return all((_least(robot, pairs, count) <= PLAY).all() for count in (FEW, TRIED))
+
+
+def _layout(robot: Robot, pairs: Sequence[BodyPair]) -> Layout:
+    bodies = [body for pair in pairs for body in pair]
+    return layout_of(robot, bodies, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
 
 
 def _overlap(robot: Robot, pairs: Sequence[BodyPair]) -> Flags:
     """Who overlaps, (TRIED, K), in the joint vectors drawn."""
-    flat = [body for pair in pairs for body in pair]
     found = np.empty((TRIED, len(pairs)), bool)
-    layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
-    which_overlap(layout, quasi_random_points(robot.lower, robot.upper, TRIED), found)
+    which_overlap(_layout(robot, pairs), quasi_random_points(robot.lower, robot.upper, TRIED), found)
     return found
 
 

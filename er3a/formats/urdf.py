@@ -25,6 +25,7 @@ import scipy
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.meshes import simplified
+from er3a.collision.pairs import link_label
 from er3a.collision.shapes import arm_shapes
 from er3a.comparison.axis_table import table_from_axes
 from er3a.errors import Er3aError, InputError
@@ -115,8 +116,8 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     given = _chain_forward(found.joints, values)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
-    shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
     visuals, unseen = link_visuals(path, root, robot, placed)
+    shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found), visuals)
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
     robot, empty = without_placeholders(robot.replace(**shapes, visuals=visuals, masses=masses))
@@ -127,7 +128,7 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     }
     but, guessed = dict[str, str](), ("envelopes",) if lost else ()
     if lost:
-        but["envelopes"] = f", but for shapes of {', '.join(lost)}, which are left out"
+        but["envelopes"] = f", but for shapes of {', '.join(lost)}, which are left out or as they look"
     if changed:
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
         but["inertia"] = f", but for the inertia of {which}, for which the nearest possible one was taken"
@@ -266,9 +267,15 @@ def _hanging(found: urdf_tree.UrdfChain) -> set[str]:
 
 
 def link_shapes(
-    path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces, hanging: Collection[str]
+    path: Path,
+    root: ElementTree.Element,
+    robot: Robot,
+    placed: urdf_tree.LinkPlaces,
+    hanging: Collection[str],
+    visuals: Sequence[LinkMesh],
 ) -> tuple[dict[str, Any], tuple[str, ...], tuple[str, ...]]:
-    """The collision geometry of a URDF, in the frames of the links of the robot made from it.
+    """The collision geometry of a URDF, in the frames of the links of the robot made from it; of links that have none
+    that can be read, how they look.
 
     Parameters
     ----------
@@ -281,7 +288,7 @@ def link_shapes(
     -------
     fields : ``envelopes``, ``hulls`` and ``meshes`` of :class:`Robot`, in m
     notes : what was left out or changed, in words: one for shapes that could not be read, one for links off the chain
-    lost : links of which a shape could not be read, or is not moved with the arm
+    lost : links of which a shape could not be read, or is not moved with the arm; robot's links that stand for theirs
     """
     shapes, unread, astray = list[urdf_tree.Shape](), dict[str, str](), list[str]()
     for name, collisions, place in urdf_tree.in_links(root, robot, placed, "collision"):
@@ -295,6 +302,8 @@ def link_shapes(
             except Er3aError as error:
                 unread.setdefault(name, _said(path, error))
         shapes += urdf_tree.with_capsules(made)
+    seen = {each.link for each in visuals} - {each.link for each in shapes}
+    shapes += (each for each in visuals if each.link in seen)
     shapes.sort(key=lambda each: each.link)
     surfaces: dict[int, list[Reals]] = {}
     for shape in shapes:
@@ -306,9 +315,12 @@ def link_shapes(
         "meshes": tuple(link_mesh(number, np.concatenate(parts)) for number, parts in surfaces.items()),
     }
     notes = [f"shapes of {', '.join(unread)} are left out ({next(iter(unread.values()))})"] if unread else []
+    looks = tuple(link_label(number) for number in sorted(seen))
+    if looks:
+        notes.append(f"without a collision shape that can be read, and checked as they look: {', '.join(looks)}")
     if astray:
         notes.append(f"shapes of {', '.join(astray)} are left out: they do not move with the arm's chain")
-    return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
+    return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging), *looks)
 
 
 def _said(path: Path, error: Er3aError) -> str:

@@ -56,7 +56,7 @@ def import_urdf(
         imported = read_urdf(file, base=base, tip=tip, snap=snap, xacro=xacro or ())
     robot = imported.robot
     if srdf is not None:
-        robot = robot.replace(home=srdf_home(srdf, imported.joints))
+        robot = robot.replace(home=srdf_home(srdf, robot, imported.joints))
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(robot.replace(name=output.stem), output)
