@@ -35,7 +35,7 @@ from er3a.formats.placeholders import without_placeholders
 from er3a.geometry.transforms import rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, LinkMesh, Robot, Source, robot_name
 
 MISFIT_POSES = 1000
@@ -82,6 +82,7 @@ def import_urdf(
     xacro: Sequence[str] = (),
 ) -> UrdfImport:
     """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
+    Links none of whose collision shapes can be read are checked as they look.
 
     The flange is the tip: the link that ``tip`` names, otherwise the end of the fixed joints after the last joint, or
     that joint's own link if they branch. Loads, cameras and tools are mounted there.
@@ -116,8 +117,12 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     given = _chain_forward(found.joints, values)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
+    shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
     visuals, unseen = link_visuals(path, root, robot, placed)
-    shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found), visuals)
+    given = {shape.link for own in shapes.values() for shape in own}
+    seen = tuple(each for each in visuals if each.link not in given)
+    shapes["meshes"] += seen
+    lost += tuple(link_label(each.link) for each in seen)
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
     robot, empty = without_placeholders(robot.replace(**shapes, visuals=visuals, masses=masses))
@@ -126,14 +131,17 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
         "inertia": bool(robot.masses.links),
         "drives": robot.masses.drives is not None,
     }
-    but, guessed = dict[str, str](), ("envelopes",) if lost else ()
+    but = dict[str, str]()
     if lost:
-        but["envelopes"] = f", but for shapes of {', '.join(lost)}, which are left out or as they look"
+        but["envelopes"] = f", but for shapes of {', '.join(lost)}, which are left out or as the links look"
     if changed:
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
         but["inertia"] = f", but for the inertia of {which}, for which the nearest possible one was taken"
     more = {
-        group: Source(f"As {path.name} states it{but.get(group, '')}", "inferred" if group in guessed else "export")
+        group: Source(
+            f"As {path.name} states it{but.get(group, '')}",
+            "export" if group != "envelopes" or not lost else "inferred",
+        )
         for group, there in stated.items()
         if there
     }
@@ -164,14 +172,12 @@ def urdf_table(
     path = Path(path)
     chain, root = urdf_tree.read_chain(path, base, tip, False), urdf_tree.urdf_root(path)
     robot, *_, notes = _robot_of_chain(path, chain)
-    groups: set[UrdfGroup] = set()
-    if root.find("link/collision") is not None:
-        groups.add("envelopes")
-    if root.find("link/inertial") is not None:
-        groups.add("inertia")
-    if urdf_tree.drives_of(root, [joint.name for joint in chain.joints if joint.moves]) is not None:
-        groups.add("drives")
-    return robot, (*chain.notes, *notes), frozenset(groups)
+    there: dict[UrdfGroup, object] = {
+        "envelopes": root.find("link/collision"),
+        "inertia": root.find("link/inertial"),
+        "drives": urdf_tree.drives_of(root, [joint.name for joint in chain.joints if joint.moves]),
+    }
+    return robot, (*chain.notes, *notes), frozenset(group for group, found in there.items() if found is not None)
 
 
 def _robot_of_chain(
@@ -267,15 +273,9 @@ def _hanging(found: urdf_tree.UrdfChain) -> set[str]:
 
 
 def link_shapes(
-    path: Path,
-    root: ElementTree.Element,
-    robot: Robot,
-    placed: urdf_tree.LinkPlaces,
-    hanging: Collection[str],
-    visuals: Sequence[LinkMesh],
+    path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces, hanging: Collection[str]
 ) -> tuple[dict[str, Any], tuple[str, ...], tuple[str, ...]]:
-    """The collision geometry of a URDF, in the frames of the links of the robot made from it; of links that have none
-    that can be read, how they look.
+    """The collision geometry of a URDF, in the frames of the links of the robot made from it.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def link_shapes(
     -------
     fields : ``envelopes``, ``hulls`` and ``meshes`` of :class:`Robot`, in m
     notes : what was left out or changed, in words: one for shapes that could not be read, one for links off the chain
-    lost : links of which a shape could not be read, or is not moved with the arm; robot's links that stand for theirs
+    lost : links of which a shape could not be read, or is not moved with the arm
     """
     shapes, unread, astray = list[urdf_tree.Shape](), dict[str, str](), list[str]()
     for name, collisions, place in urdf_tree.in_links(root, robot, placed, "collision"):
@@ -302,8 +302,6 @@ def link_shapes(
             except Er3aError as error:
                 unread.setdefault(name, _said(path, error))
         shapes += urdf_tree.with_capsules(made)
-    seen = {each.link for each in visuals} - {each.link for each in shapes}
-    shapes += (each for each in visuals if each.link in seen)
     shapes.sort(key=lambda each: each.link)
     surfaces: dict[int, list[Reals]] = {}
     for shape in shapes:
@@ -314,13 +312,14 @@ def link_shapes(
         "hulls": tuple(shape for shape in shapes if isinstance(shape, ConvexPiece)),
         "meshes": tuple(link_mesh(number, np.concatenate(parts)) for number, parts in surfaces.items()),
     }
-    notes = [f"shapes of {', '.join(unread)} are left out ({next(iter(unread.values()))})"] if unread else []
-    looks = tuple(link_label(number) for number in sorted(seen))
-    if looks:
-        notes.append(f"without a collision shape that can be read, and checked as they look: {', '.join(looks)}")
+    notes = (
+        [f"shapes of {', '.join(unread)} are left out ({next(iter(unread.values()))}); such links count as they look"]
+        if unread
+        else []
+    )
     if astray:
         notes.append(f"shapes of {', '.join(astray)} are left out: they do not move with the arm's chain")
-    return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging), *looks)
+    return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
 
 
 def _said(path: Path, error: Er3aError) -> str:
@@ -345,7 +344,7 @@ def link_visuals(
     surfaces : one for each link that has any, m, simplified to ``DRAWN_TRIANGLES`` in all
     notes : one at most, about geometry that could not be read
     """
-    parts: dict[int, list[tuple[Reals, Integers]]] = {}
+    parts: dict[int, list[Reals]] = {}
     missing = dict[str, str]()
     for name, visuals, place in urdf_tree.in_links(root, robot, placed, "visual"):
         T, number = place or (np.eye(4), 0)
@@ -355,10 +354,10 @@ def link_visuals(
             except Er3aError as error:
                 missing.setdefault(name, _said(path, error))
                 continue
-            parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3], faces))
+            parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3])[faces])
     found = []
     for number, meshes in sorted(parts.items()):
-        whole = link_mesh(number, np.concatenate([points[faces] for points, faces in meshes]))
+        whole = link_mesh(number, np.concatenate(meshes))
         points, faces = simplified(whole.points, whole.faces, DRAWN_TRIANGLES // len(parts))
         found.append(link_mesh(number, points[faces]))
     notes = (f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values())
