@@ -184,13 +184,13 @@ def _checked(robot: Robot, pairs: Sequence[BodyPair], q: Reals, overlap: Flags) 
         watched.append(pair)
     state: PairState = "never" if not watched else "undecided" if witness is None and undecided else "meets"
     bound = np.nan if watched else min(bounds)
-    return MatrixRow(*(body.name for body in pairs[0]), state, witness, bound, boxes=looked), watched
+    return MatrixRow(pairs[0][0].name, pairs[0][1].name, state, witness, bound, boxes=looked), watched
 
 
 def _joined(robot: Robot, pairs: Sequence[BodyPair], overlap: Flags) -> tuple[MatrixRow, list[BodyPair]]:
     """Capsules of two links that a joint joins, without the region around it: it grows until the rest comes apart."""
     bodies = pairs[int(overlap.sum(axis=0).argmax())]
-    names, centres = [body.name for body in bodies], _centres(robot, bodies)
+    names, centres = (bodies[0].name, bodies[1].name), _centres(robot, bodies)
     radius = sum(map(girth, bodies, centres))
     for _ in range(GROWTHS):
         rest = [

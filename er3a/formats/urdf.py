@@ -119,8 +119,8 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
     shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
     visuals, unseen = link_visuals(path, root, robot, placed)
-    given = {shape.link for own in shapes.values() for shape in own}
-    seen = tuple(each for each in visuals if each.link not in given)
+    have = {shape.link for own in shapes.values() for shape in own}
+    seen = tuple(each for each in visuals if each.link not in have)
     shapes["meshes"] += seen
     lost += tuple(link_label(each.link) for each in seen)
     names = tuple(joint.name for joint in sources)
