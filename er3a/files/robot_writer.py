@@ -129,8 +129,9 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
 
 def _short(lengths_mm: np.ndarray) -> bool:
     """Whether a table has lengths so short that a person's would be taken for metres."""
-    short = (lengths_mm > 0) & (lengths_mm < SHORTEST_PLAIN_LENGTH_MM)
-    return bool(short.any() or 0 < lengths_mm.max() < MIN_LONGEST_MM)
+    return bool(
+        ((lengths_mm > 0) & (lengths_mm < SHORTEST_PLAIN_LENGTH_MM)).any() or 0 < lengths_mm.max() < MIN_LONGEST_MM
+    )
 
 
 def _shifted(base: np.ndarray) -> bool:

@@ -128,8 +128,8 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     robot, empty = without_placeholders(robot.replace(**shapes, visuals=visuals, masses=masses))
     stated = {
         "envelopes": any(shapes.values()),
-        "inertia": bool(robot.masses.links),
-        "drives": robot.masses.drives is not None,
+        "inertia": robot.masses.links,
+        "drives": robot.masses.drives,
     }
     but = dict[str, str]()
     if lost:
@@ -347,8 +347,10 @@ def link_visuals(
     parts: dict[int, list[Reals]] = {}
     missing = dict[str, str]()
     for name, visuals, place in urdf_tree.in_links(root, robot, placed, "visual"):
-        T, number = place or (np.eye(4), 0)
-        for visual in visuals if place else ():
+        if place is None:
+            continue
+        T, number = place
+        for visual in visuals:
             try:
                 points, faces = urdf_tree.visual_surface(path, name, visual)
             except Er3aError as error:
@@ -360,8 +362,8 @@ def link_visuals(
         whole = link_mesh(number, np.concatenate(meshes))
         points, faces = simplified(whole.points, whole.faces, DRAWN_TRIANGLES // len(parts))
         found.append(link_mesh(number, points[faces]))
-    notes = (f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values())
-    return tuple(found), tuple(notes)[:1]
+    notes = [f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values()]
+    return tuple(found), tuple(notes[:1])
 
 
 def _coupling(

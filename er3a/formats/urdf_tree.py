@@ -463,8 +463,7 @@ def srdf_home(path: Path, robot: Robot, joints: Sequence[str]) -> Reals | None:
             states[name] = np.array(given)
     if not states:
         raise InputError(path, "group_state", f"none gives {_some(list(joints))}", "Write home_deg into the robot file")
-    regular = (q for q in states.values() if not USUAL_NEAR.contains(robot, q[None])[0])
-    return states.get("home", next(regular, None))
+    return states.get("home", next((q for q in states.values() if not USUAL_NEAR.contains(robot, q[None])[0]), None))
 
 
 def _robot_element(path: Path) -> ElementTree.Element:
