@@ -82,7 +82,8 @@ def import_urdf(
     xacro: Sequence[str] = (),
 ) -> UrdfImport:
     """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
-    Links none of whose collision shapes can be read are checked as they look.
+    Links none of whose collision shapes can be read are checked as they look, and so are those that look larger than
+    what can be read.
 
     The flange is the tip: the link that ``tip`` names, otherwise the end of the fixed joints after the last joint, or
     that joint's own link if they branch. Loads, cameras and tools are mounted there.
@@ -119,7 +120,8 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
     shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
     visuals, unseen = link_visuals(path, root, robot, placed)
-    have = {shape.link for own in shapes.values() for shape in own}
+    larger = arm_shapes(robot.replace(**shapes, visuals=visuals)).uncovered if lost else ()
+    have = {shape.link for own in shapes.values() for shape in own} - {*dict(larger)}
     seen = tuple(each for each in visuals if each.link not in have)
     shapes["meshes"] += seen
     lost += tuple(link_label(each.link) for each in seen)
