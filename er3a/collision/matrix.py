@@ -3,7 +3,9 @@
 As MoveIt's setup assistant has it, but that "never" is proven:
 
 - *joined*: a joint joins the two: no link with a shape is between them, or they are at most ``ACROSS`` joints apart
-  and overlap in all joint vectors drawn (``TRIED``), as across a wrist. Hulls and surfaces are not checked then. Of
+  and overlap in all joint vectors drawn (``TRIED``), as across a wrist. Hulls and surfaces are not checked then, nor
+  those that stay within ``PLAY`` of each other there: what rubs at each joint value is a bearing, and whether it
+  touches by the rounding of a mesh's corners says nothing. Of
   capsules the region around the joint is left out, within the girth of both, from where they are nearest in the pose
   in which they are farthest apart. The rest is checked, so that an arm that folds onto itself is seen;
 - *overlaps*: they overlap in all joint vectors drawn and no joint explains it. No arm is built like that, so the shapes
@@ -29,7 +31,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.distances import FREE, MEETS, measure, search_boxes, some_distances, which_overlap
+from er3a.collision.distances import FREE, MEETS, Layout, measure, search_boxes, some_distances, which_overlap
 from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED, link_label
 from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_body
@@ -41,6 +43,8 @@ PairState = Literal["never", "joined", "overlaps", "guessed", "meets", "undecide
 
 ACROSS = 2  # joints that a wrist's housing hides
 POOR_GUESS = 0.1  # of the joint vectors drawn
+FEW = 8  # of the joint vectors drawn: in one of them most pairs part
+PLAY = 1e-3  # m, between housings that turn in each other
 BOXES = 50_000
 BOXES_OF_SURFACES = 2_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
@@ -117,9 +121,9 @@ def matrix_of(robot: Robot, pairs: Sequence[BodyPair], rules: Sequence[PairRule]
     matrix : a row for each two names, and the pairs of bodies that are to be checked
     """
     by_names: dict[tuple[str, str], list[BodyPair]] = {}
-    for first, second in pairs:
-        if first.link != second.link:
-            inner, outer = (first, second) if first.link < second.link else (second, first)
+    for pair in pairs:
+        inner, outer = sorted(pair, key=lambda body: body.link)
+        if inner.link < outer.link:
             by_names.setdefault((inner.name, outer.name), []).append((inner, outer))
     decided = {frozenset((rule.first, rule.second)): rule for rule in rules}
     rows: list[MatrixRow] = []
@@ -146,14 +150,17 @@ def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[Bo
     names, own = (inner.name, outer.name), outer.name == link_label(outer.link)
     neighbours = own and arm_shapes(robot).links.isdisjoint(range(inner.link + 1, outer.link))
     capsules = not any(body.tree or len(body.points) > 2 for pair in pairs for body in pair)
+    joined = MatrixRow(*names, "joined"), list[BodyPair]()
     if neighbours and not capsules:
-        return MatrixRow(*names, "joined"), []
-    q, overlap = quasi_random_points(robot.lower, robot.upper, TRIED), _overlap(robot, pairs)
+        return joined
+    q, overlap = _drawn(robot), _overlap(robot, pairs)
     near, share = neighbours or outer.link - inner.link <= ACROSS, float(overlap.any(axis=1).mean())
     if share == 1.0 and not near:
         return MatrixRow(*names, "overlaps", q[0]), []
-    if share == 1.0:
-        return _joined(robot, pairs, overlap) if capsules else (MatrixRow(*names, "joined"), [])
+    if share == 1.0 and capsules:
+        return _joined(robot, pairs, overlap)
+    if near and not capsules and all(_least(robot, pairs, count).max() <= PLAY for count in (FEW, TRIED)):
+        return joined
     if near and share >= POOR_GUESS and not arm_shapes(robot).given:
         return MatrixRow(*names, "guessed"), []
     return _checked(robot, pairs, q, overlap)
@@ -182,9 +189,9 @@ def _checked(robot: Robot, pairs: Sequence[BodyPair], q: Reals, overlap: Flags) 
 
 def _joined(robot: Robot, pairs: Sequence[BodyPair], overlap: Flags) -> tuple[MatrixRow, list[BodyPair]]:
     """Capsules of two links that a joint joins, without the region around it: it grows until the rest comes apart."""
-    inner, outer = pairs[int(overlap.sum(axis=0).argmax())]
-    centres = _centres(robot, (inner, outer))
-    radius = sum(girth(body, centre) for body, centre in zip((inner, outer), centres))
+    bodies = pairs[int(overlap.sum(axis=0).argmax())]
+    names, centres = (bodies[0].name, bodies[1].name), _centres(robot, bodies)
+    radius = sum(map(girth, bodies, centres))
     for _ in range(GROWTHS):
         rest = [
             (first, second)
@@ -198,12 +205,12 @@ def _joined(robot: Robot, pairs: Sequence[BodyPair], overlap: Flags) -> tuple[Ma
         radius *= GROWTH
     else:
         rest = []
-    row = MatrixRow(inner.name, outer.name, "joined", left_out=radius)
+    row = MatrixRow(*names, "joined", left_out=radius)
     if not rest:
         return row, []
     if left.any(axis=1).mean() >= POOR_GUESS and not arm_shapes(robot).given:
-        return MatrixRow(inner.name, outer.name, "guessed"), []
-    found, watched = _checked(robot, rest, quasi_random_points(robot.lower, robot.upper, TRIED), left)
+        return MatrixRow(*names, "guessed"), []
+    found, watched = _checked(robot, rest, _drawn(robot), left)
     return replace(row, witness=found.witness, boxes=found.boxes), watched
 
 
@@ -256,7 +263,7 @@ def trimmed(body: Body, centre: Reals, radius: float) -> list[Body]:
 def _centres(robot: Robot, pair: BodyPair) -> list[Reals]:
     """Where two capsules are nearest to each other, each point (3,), m, in its own link's frame, in the one of the
     joint vectors drawn in which they are farthest apart."""
-    apart = quasi_random_points(robot.lower, robot.upper, TRIED)[int(_distances(robot, pair).argmax())]
+    apart = _drawn(robot)[int(_least(robot, [pair]).argmax())]
     near = _measured(robot, pair, [(0, 1)], apart)[2][0]
     frames = (link_frames(robot, apart)[body.link] for body in pair)
     return [frame[:3, :3].T @ (point - frame[:3, 3]) for frame, point in zip(frames, near)]
@@ -273,32 +280,40 @@ def _measured(
 def _searched(robot: Robot, pair: BodyPair, boxes: int) -> tuple[int, Reals, float, int]:
     """Of two bodies that overlap in none of the joint vectors drawn: what boxes prove (:func:`search_boxes`), where
     they meet (n,), a bound of their distance (m), and how many boxes were looked at."""
-    layout, box, at = layout_of(robot, pair, [(0, 1)]), np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
-    if any(body.tree for body in pair):
-        outcome, looked, bound = search_boxes(layout, 0, box, (False, 0.0), BOXES_OF_SURFACES, at)
-        return outcome, at, bound, looked
-    goal = GOAL * float(_distances(robot, pair).min())
-    outcome, looked, bound = search_boxes(layout, 0, box, (False, goal), boxes // 2, at)
-    if outcome not in (FREE, MEETS):
-        outcome, more, bound = search_boxes(layout, 0, box, (False, 0.0), boxes, at)
+    layout, box, at = _layout(robot, [pair]), np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
+    tries = [(0.0, BOXES_OF_SURFACES)]
+    if not any(body.tree for body in pair):
+        tries = [(GOAL * float(_least(robot, [pair]).min()), boxes // 2), (0.0, boxes)]
+    looked = 0
+    for goal, most in tries:
+        outcome, more, bound = search_boxes(layout, 0, box, (False, goal), most, at)
         looked += more
+        if outcome in (FREE, MEETS):
+            break
     return outcome, at, bound, looked
 
 
-def _distances(robot: Robot, pair: BodyPair) -> Reals:
-    """Of two bodies (TRIED,), m, in the joint vectors drawn."""
-    q, found = quasi_random_points(robot.lower, robot.upper, TRIED), np.empty((TRIED, 1))
-    none = np.empty(TRIED), np.empty(TRIED, np.int64), np.empty(TRIED, bool)
-    measure(layout_of(robot, pair, [(0, 1)]), q, found, *none)
-    return found[:, 0]
+def _drawn(robot: Robot) -> Reals:
+    """The joint vectors drawn, (TRIED, n), rad or m."""
+    return quasi_random_points(robot.lower, robot.upper, TRIED)
+
+
+def _least(robot: Robot, pairs: Sequence[BodyPair], count: int = TRIED) -> Reals:
+    """The smallest distance of pairs (count,), m, in the first of the joint vectors drawn."""
+    q, found = _drawn(robot)[:count], np.empty(count)
+    measure(_layout(robot, pairs), q, np.empty((0, 0)), found, np.empty(count, np.int64), np.empty(count, bool))
+    return found
+
+
+def _layout(robot: Robot, pairs: Sequence[BodyPair]) -> Layout:
+    bodies = [body for pair in pairs for body in pair]
+    return layout_of(robot, bodies, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
 
 
 def _overlap(robot: Robot, pairs: Sequence[BodyPair]) -> Flags:
     """Who overlaps, (TRIED, K), in the joint vectors drawn."""
-    flat = [body for pair in pairs for body in pair]
     found = np.empty((TRIED, len(pairs)), bool)
-    layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
-    which_overlap(layout, quasi_random_points(robot.lower, robot.upper, TRIED), found)
+    which_overlap(_layout(robot, pairs), _drawn(robot), found)
     return found
 
 
@@ -362,8 +377,7 @@ def solids_met(robot: Robot, box: Box, scene: Scene) -> tuple[str, ...]:
     """
     inner = replace(box, size=np.maximum(np.asarray(box.size) - 2 * PENETRATION_TOLERANCE, PENETRATION_TOLERANCE))
     bodies = [solid_body(each) for each in (inner, *scene.solids)]
-    pairs = [(0, k) for k in range(1, len(bodies))]
-    distances, deep, _ = _measured(robot, bodies, pairs, np.zeros(robot.joints))
+    distances, deep, _ = _measured(robot, bodies, [(0, k) for k in range(1, len(bodies))], np.zeros(robot.joints))
     return tuple(body.name for body, touches in zip(bodies[1:], deep | (distances < 0)) if touches)
 
 

@@ -227,7 +227,7 @@ def _beyond(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: s
 
     They are looked at in one pose: a joint between two links turns about the line on which they meet.
     """
-    T = link_frames(robot, np.clip(np.zeros(robot.joints), robot.lower, robot.upper))
+    T = link_frames(robot, np.clip(0.0, robot.lower, robot.upper))
 
     def placed(points: Reals, k: int) -> Reals:
         return points @ T[k, :3, :3].T + T[k, :3, 3]

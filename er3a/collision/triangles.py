@@ -30,7 +30,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 40 levels deep
-PROBES = 32  # points of a surface, besides one of each shell, that are looked for inside others
+PROBES = 8  # outermost points of a surface, besides one of each shell, that are looked for inside others
 FIRST = 14  # corners, with which the choice of few of a hull begins
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
@@ -87,8 +87,8 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
     faces = same.reshape(-1)[faces]
     corner = np.ascontiguousarray(points[faces])
     number, shell = _shells(faces, len(points))
-    tried = np.r_[np.unique(number, return_index=True)[1], : len(corner) : -(-len(corner) // PROBES)]
-    probe = corner[tried, 0]
+    outermost = faces.ravel()[(fibonacci_sphere(PROBES) @ points[faces.ravel()].T).argmax(axis=1)]
+    probe = points[np.r_[faces[np.unique(number, return_index=True)[1], 0], outermost]]
     low, high = corner.min(axis=1), corner.max(axis=1)
     order, middle = np.arange(len(faces)), corner.mean(axis=1)
     starts, ends = np.array([0]), np.array([len(faces)])

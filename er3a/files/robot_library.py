@@ -111,7 +111,7 @@ def read_arm(
                 tip = tip_after(plain, base, joints)
             if whole:
                 imported = import_urdf(plain, base=base, tip=tip)
-                home = None if srdf is None else srdf_home(srdf, imported.joints)
+                home = None if srdf is None else srdf_home(srdf, imported.robot, imported.joints)
                 return ReadArm(imported.robot.replace(home=home), False, imported.notes)
             robot, assumed, beside = urdf_table(plain, base=base, tip=tip)
         units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")

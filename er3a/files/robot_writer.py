@@ -62,7 +62,7 @@ def mass_groups(robot: Robot) -> dict[str, dict[str, Any]]:
 def _link(link: int, body: MassBody) -> dict[str, Any]:
     named = {name: split_unit(name) for name in BodyFields.model_fields}
     row = {name: np.asarray(from_si(unit, getattr(body, stem))).tolist() for name, (stem, unit) in named.items()}
-    return row | {"link": link, "centre_mm": [_tidy(value) for value in row["centre_mm"]]}
+    return row | {"link": link, "centre_mm": list(map(_tidy, row["centre_mm"]))}
 
 
 def _drive(robot: Robot, k: int) -> dict[str, float]:
@@ -87,15 +87,10 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
     zero_rows, dh_rows = list[dict[str, Any]](), list[dict[str, Any]]()
     for k, sliding in enumerate(robot.sliding):
         angles = {name: _tidy(np.degrees(getattr(robot, name)[k])) for name in ("alpha", "beta", "offset")}
-        zero = {"direction": int(robot.direction[k]), "offset_deg": None if sliding else angles["offset"]}
-        zero_rows.append(zero)
-        row: dict[str, Any] = {
-            "a_mm": _tidy(robot.a[k] * 1000),
-            "alpha_deg": angles["alpha"],
-            "d_mm": _tidy(robot.d[k] * 1000),
-        }
+        zero_rows.append({"direction": int(robot.direction[k]), "offset_deg": None if sliding else angles["offset"]})
+        row: dict[str, Any] = {f"{name}_mm": _tidy(getattr(robot, name)[k] * 1000) for name in ("a", "d")}
         row |= {"type": "prismatic", "theta_deg": angles["offset"]} if sliding else {}
-        dh_rows.append(row | {"beta_deg": angles["beta"] or None})
+        dh_rows.append(row | {"alpha_deg": angles["alpha"], "beta_deg": angles["beta"] or None})
     lengths = np.abs(np.concatenate([robot.a, robot.d])) * 1000
     groups: dict[str, dict[str, Any]] = {
         "dh": {
@@ -121,7 +116,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         "zero_pose": robot.zero_pose or "not stated",
         "references": list(robot.references),
         "visuals": _surfaces(robot.visuals),
-        "home_deg": None if robot.home is None else [_tidy(value) for value in shown(robot, robot.home)],
+        "home_deg": None if robot.home is None else list(map(_tidy, shown(robot, robot.home))),
     }
     if robot.pair_rules:
         content["collision"] = {rule: _decided(robot, rule) for rule in ("allow", "watch")}
@@ -134,8 +129,9 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
 
 def _short(lengths_mm: np.ndarray) -> bool:
     """Whether a table has lengths so short that a person's would be taken for metres."""
-    short = (lengths_mm > 0) & (lengths_mm < SHORTEST_PLAIN_LENGTH_MM)
-    return bool(short.any() or 0 < lengths_mm.max() < MIN_LONGEST_MM)
+    return bool(
+        ((lengths_mm > 0) & (lengths_mm < SHORTEST_PLAIN_LENGTH_MM)).any() or 0 < lengths_mm.max() < MIN_LONGEST_MM
+    )
 
 
 def _shifted(base: np.ndarray) -> bool:
@@ -148,8 +144,8 @@ def _placements(robot: Robot) -> Iterator[tuple[str, dict]]:
     for key in ("base", "flange", "tool"):
         T = getattr(robot, key)
         if not np.array_equal(T, np.eye(4)):
-            xyz, rpy = map(_tidy, T[:3, 3] * 1000), map(_tidy, np.degrees(rpy_of(T)))
-            yield key, {"xyz_mm": list(xyz), "rpy_deg": list(rpy)}
+            at = {"xyz_mm": T[:3, 3] * 1000, "rpy_deg": np.degrees(rpy_of(T))}
+            yield key, {name: list(map(_tidy, values)) for name, values in at.items()}
 
 
 def _speed_rows(robot: Robot) -> list[dict]:

@@ -25,6 +25,7 @@ import scipy
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.meshes import simplified
+from er3a.collision.pairs import link_label
 from er3a.collision.shapes import arm_shapes
 from er3a.comparison.axis_table import table_from_axes
 from er3a.errors import Er3aError, InputError
@@ -34,7 +35,7 @@ from er3a.formats.placeholders import without_placeholders
 from er3a.geometry.transforms import rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, LinkMesh, Robot, Source, robot_name
 
 MISFIT_POSES = 1000
@@ -81,6 +82,8 @@ def import_urdf(
     xacro: Sequence[str] = (),
 ) -> UrdfImport:
     """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
+    Links none of whose collision shapes can be read are checked as they look, and so are those that look larger than
+    what can be read.
 
     The flange is the tip: the link that ``tip`` names, otherwise the end of the fixed joints after the last joint, or
     that joint's own link if they branch. Loads, cameras and tools are mounted there.
@@ -117,22 +120,30 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
     shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
     visuals, unseen = link_visuals(path, root, robot, placed)
+    larger = arm_shapes(robot.replace(**shapes, visuals=visuals)).uncovered if lost else ()
+    have = {shape.link for own in shapes.values() for shape in own} - {*dict(larger)}
+    seen = tuple(each for each in visuals if each.link not in have)
+    shapes["meshes"] += seen
+    lost += tuple(link_label(each.link) for each in seen)
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
     robot, empty = without_placeholders(robot.replace(**shapes, visuals=visuals, masses=masses))
     stated = {
         "envelopes": any(shapes.values()),
-        "inertia": bool(robot.masses.links),
-        "drives": robot.masses.drives is not None,
+        "inertia": robot.masses.links,
+        "drives": robot.masses.drives,
     }
-    but, guessed = dict[str, str](), ("envelopes",) if lost else ()
+    but = dict[str, str]()
     if lost:
-        but["envelopes"] = f", but for shapes of {', '.join(lost)}, which are left out"
+        but["envelopes"] = f", but for shapes of {', '.join(lost)}, which are left out or as the links look"
     if changed:
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
         but["inertia"] = f", but for the inertia of {which}, for which the nearest possible one was taken"
     more = {
-        group: Source(f"As {path.name} states it{but.get(group, '')}", "inferred" if group in guessed else "export")
+        group: Source(
+            f"As {path.name} states it{but.get(group, '')}",
+            "export" if group != "envelopes" or not lost else "inferred",
+        )
         for group, there in stated.items()
         if there
     }
@@ -163,14 +174,12 @@ def urdf_table(
     path = Path(path)
     chain, root = urdf_tree.read_chain(path, base, tip, False), urdf_tree.urdf_root(path)
     robot, *_, notes = _robot_of_chain(path, chain)
-    groups: set[UrdfGroup] = set()
-    if root.find("link/collision") is not None:
-        groups.add("envelopes")
-    if root.find("link/inertial") is not None:
-        groups.add("inertia")
-    if urdf_tree.drives_of(root, [joint.name for joint in chain.joints if joint.moves]) is not None:
-        groups.add("drives")
-    return robot, (*chain.notes, *notes), frozenset(groups)
+    there: dict[UrdfGroup, object] = {
+        "envelopes": root.find("link/collision"),
+        "inertia": root.find("link/inertial"),
+        "drives": urdf_tree.drives_of(root, [joint.name for joint in chain.joints if joint.moves]),
+    }
+    return robot, (*chain.notes, *notes), frozenset(group for group, found in there.items() if found is not None)
 
 
 def _robot_of_chain(
@@ -305,7 +314,11 @@ def link_shapes(
         "hulls": tuple(shape for shape in shapes if isinstance(shape, ConvexPiece)),
         "meshes": tuple(link_mesh(number, np.concatenate(parts)) for number, parts in surfaces.items()),
     }
-    notes = [f"shapes of {', '.join(unread)} are left out ({next(iter(unread.values()))})"] if unread else []
+    notes = (
+        [f"shapes of {', '.join(unread)} are left out ({next(iter(unread.values()))}); such links count as they look"]
+        if unread
+        else []
+    )
     if astray:
         notes.append(f"shapes of {', '.join(astray)} are left out: they do not move with the arm's chain")
     return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
@@ -333,24 +346,26 @@ def link_visuals(
     surfaces : one for each link that has any, m, simplified to ``DRAWN_TRIANGLES`` in all
     notes : one at most, about geometry that could not be read
     """
-    parts: dict[int, list[tuple[Reals, Integers]]] = {}
+    parts: dict[int, list[Reals]] = {}
     missing = dict[str, str]()
     for name, visuals, place in urdf_tree.in_links(root, robot, placed, "visual"):
-        T, number = place or (np.eye(4), 0)
-        for visual in visuals if place else ():
+        if place is None:
+            continue
+        T, number = place
+        for visual in visuals:
             try:
                 points, faces = urdf_tree.visual_surface(path, name, visual)
             except Er3aError as error:
                 missing.setdefault(name, _said(path, error))
                 continue
-            parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3], faces))
+            parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3])[faces])
     found = []
     for number, meshes in sorted(parts.items()):
-        whole = link_mesh(number, np.concatenate([points[faces] for points, faces in meshes]))
+        whole = link_mesh(number, np.concatenate(meshes))
         points, faces = simplified(whole.points, whole.faces, DRAWN_TRIANGLES // len(parts))
         found.append(link_mesh(number, points[faces]))
-    notes = (f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values())
-    return tuple(found), tuple(notes)[:1]
+    notes = [f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values()]
+    return tuple(found), tuple(notes[:1])
 
 
 def _coupling(

@@ -43,6 +43,7 @@ from er3a.formats.mesh_file import read_link_mesh, read_text
 from er3a.formats.xacro_expansion import FOLDERS_UP, packages_near
 from er3a.geometry.transforms import rpy_of, transform, translation
 from er3a.kinematics.forward import frames
+from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.si_units import limit_in_degrees
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, moved, nearest_body, no_body, together
@@ -434,17 +435,18 @@ def urdf_root(path: Path) -> ElementTree.Element:
     return root
 
 
-def srdf_home(path: Path, joints: Sequence[str]) -> Reals:
-    """The joint values of a group state of an SRDF: of those that give all joints the one named home, else the first.
+def srdf_home(path: Path, robot: Robot, joints: Sequence[str]) -> Reals | None:
+    """The joint values of a group state of an SRDF: of those that give all joints the one named home, else the first
+    that is not near-singular: a state such as zero is drawn by, and no arm can follow a line from there.
 
     Parameters
     ----------
     path : the SRDF, or xacro of it
-    joints : names, in the order of the values
+    joints : names, in the order of the robot's joints
 
     Returns
     -------
-    q : (n,), rad or m
+    q : (n,), rad or m; None where only near-singular states are given
 
     Raises
     ------
@@ -461,7 +463,7 @@ def srdf_home(path: Path, joints: Sequence[str]) -> Reals:
             states[name] = np.array(given)
     if not states:
         raise InputError(path, "group_state", f"none gives {_some(list(joints))}", "Write home_deg into the robot file")
-    return states.get("home", next(iter(states.values())))
+    return states.get("home", next((q for q in states.values() if not USUAL_NEAR.contains(robot, q[None])[0]), None))
 
 
 def _robot_element(path: Path) -> ElementTree.Element:

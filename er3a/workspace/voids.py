@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from er3a.geometry.vectors import TURN
+from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.causes import VoidCause, cause_of, relaxations
@@ -238,7 +239,8 @@ class Void:
     lower, upper : bounds of its volume, m^3
     centroid : (3,), m
     low, high : (3,), m, corners of the box along x, y, z that nothing of it lies outside
-    holds_shoulder : whether it holds the point of axis 1 at the height of joint 2
+    holds_shoulder : whether it holds a point between axis 1 and joint 2, at the height of joint 2: with the elbow bent
+        as far as it goes the tool stays so far away from there
     vertices, triangles : (V, 3), m, and (F, 3), its surface on blocks
     """
 
@@ -254,13 +256,12 @@ class Void:
     triangles: Integers
 
 
-def proven_voids(robot: Robot, proven: Proven, shoulder: Reals) -> list[Void]:
+def proven_voids(robot: Robot, proven: Proven) -> list[Void]:
     """Voids that the proof finds: enclosed ones, and open pockets in the hull of the blocks that may be reached.
 
     Parameters
     ----------
     proven : of the robot
-    shoulder : (3,), m, base frame, the point of axis 1 at the height of joint 2
 
     Returns
     -------
@@ -268,7 +269,7 @@ def proven_voids(robot: Robot, proven: Proven, shoulder: Reals) -> list[Void]:
     """
     enclosed, outside = cavities(proven.section)
     found = [
-        _void("enclosed", robot, proven, cavity, shoulder, _outline(proven, cavity))
+        _void("enclosed", robot, proven, cavity, _outline(proven, cavity))
         for cavity in enclosed
         if cavity.lower > _SPECK_M3
     ]
@@ -277,20 +278,18 @@ def proven_voids(robot: Robot, proven: Proven, shoulder: Reals) -> list[Void]:
     corners = places[~inside & ~scipy.ndimage.binary_erosion(~inside)]  # those within have no part in the hull
     inside[inside] = inside_hull(corners, places[inside])
     for mask in pockets(blocks, inside):
-        found.append(_void("open", robot, proven, _as_cavity(blocks, mask), shoulder, (blocks, mask)))
+        found.append(_void("open", robot, proven, _as_cavity(blocks, mask), (blocks, mask)))
     return sorted(found, key=lambda void: -void.lower)
 
 
-def _void(
-    kind: VoidKind, robot: Robot, proven: Proven, cavity: Cavity, shoulder: Reals, surface: tuple[Blocks, Flags]
-) -> Void:
+def _void(kind: VoidKind, robot: Robot, proven: Proven, cavity: Cavity, surface: tuple[Blocks, Flags]) -> Void:
     """A void with its place, cause and surface, in the base frame."""
     low, high = cavity.box()
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     corners = proven.in_base(corners)
-    size, (rho, _, z) = proven.section.size, (float(part[0]) for part in proven.in_section(shoulder[None]))
-    near = (cavity.cells[:, [0, 2]] <= [rho + size, z + size]).all(axis=1)
-    near &= (cavity.cells[:, [1, 3]] >= [rho - size, z - size]).all(axis=1)
+    joint_2 = forward(robot, np.zeros(robot.joints), frame=1)[None, :3, 3]
+    size, (rho, _, z) = proven.section.size, (float(part[0]) for part in proven.in_section(joint_2))
+    near = (cavity.cells[:, [0, 2]] <= [rho + size, z + size]).all(axis=1) & (cavity.cells[:, 3] >= z - size)
     blocks, mask = surface
     vertices, triangles = mesh(blocks, mask)
     vertices = proven.in_base(vertices)

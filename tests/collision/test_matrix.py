@@ -7,6 +7,7 @@ from itertools import pairwise
 import coal
 import numpy as np
 import pytest
+import trimesh
 
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
@@ -19,8 +20,9 @@ from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile
 from er3a.finding import fact
+from er3a.kinematics.forward import frames
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.robots.robot import ConvexPiece, Envelope, PairRule, Robot
+from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, PairRule, Robot
 from testing.arms import OTHERS_LONG, made_of, make_arm
 
 SAMPLES = 500
@@ -383,3 +385,19 @@ def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes()
     assert 0.05 < bodies.free(q).mean() < 1
     allowed = tuple(PairRule("base", f"link_{k}", "allow", "made so") for k in (3, 4, 6))
     assert Bodies(swollen.replace(pair_rules=allowed), None).in_error == ()
+
+
+@pytest.mark.parametrize(("inner", "adjacent"), [(0.0493, True), (0.046, False)])
+def test_housings_that_turn_in_each_other_are_adjacent(inner, adjacent):
+    """A ball on link 6 in an open shell on link 4, both about the wrist's centre: apart by less than 1 mm, or more."""
+    robot = load_robot("er3a_c60")
+    poses, shapes = frames(robot, np.zeros(6)), []
+    centre = poses[4][:3, 3]
+    for link, radius in ((4, 0.05), (6, inner)):
+        ball = trimesh.creation.icosphere(4, radius)
+        R, place = poses[link - 1][:3, :3], poses[link - 1][:3, 3]
+        points = ball.vertices + (centre - place) @ R
+        shapes.append(LinkMesh(link, points, np.array(ball.faces[link == 4 :])))
+    between = Envelope(5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.001)  # without it no link with a shape is between the two
+    rows = rows_of(robot.replace(envelopes=(between,), meshes=tuple(shapes)))
+    assert (rows["link_4", "link_6"].state == "joined") == adjacent

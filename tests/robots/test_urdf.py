@@ -379,9 +379,14 @@ def test_a_group_state_of_an_srdf_becomes_the_home_of_the_robot_file(tmp_path):
     folded, home, out = np.linspace(-1, 1, 6), np.array([0.1, -0.5, 0.7, 0.2, -1.1, 1.5]), np.full(6, 2.5)
     (tmp_path / "arm.urdf").write_text(urdf(), encoding="utf-8")
     found = import_urdf(tmp_path / "arm.urdf")
-    for given, expected in ((states(folded, home), home), (states(folded, []), folded)):
-        (tmp_path / "arm.srdf").write_text(given, encoding="utf-8")
+    zero = np.zeros(6)  # singular: home only if it is called so
+    cases = ((folded, home, home), (folded, [], folded), (folded, zero, zero), (zero, [], None))
+    for first, named, expected in cases:
+        (tmp_path / "arm.srdf").write_text(states(first, named), encoding="utf-8")
         robot = read_arm(str(tmp_path / "arm.urdf"), whole=True, srdf=tmp_path / "arm.srdf").robot
+        if expected is None:
+            assert robot.home is None
+            continue
         write_robot(robot, tmp_path / "arm.yaml")
         np.testing.assert_allclose(load_robot(tmp_path / "arm.yaml").home, expected, atol=1e-9)
     with pytest.raises(InputError) as caught:
@@ -392,5 +397,5 @@ def test_a_group_state_of_an_srdf_becomes_the_home_of_the_robot_file(tmp_path):
     assert caught.value.field == "--srdf"
     (tmp_path / "arm.srdf").write_text(states([], []), encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        srdf_home(tmp_path / "arm.srdf", found.joints)
+        srdf_home(tmp_path / "arm.srdf", found.robot, found.joints)
     assert caught.value.field == "group_state"

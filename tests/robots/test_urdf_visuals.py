@@ -52,6 +52,9 @@ def test_links_look_as_their_urdf_says_and_are_checked_by_other_shapes(imported)
     assert ball.volume == pytest.approx(4 / 3 * np.pi * RADIUS**3, rel=0.01)
     assert box.volume == pytest.approx(np.prod(SIZE))
     assert [each.radius for each in robot.envelopes] == [0.06]
+    (only,) = robot.meshes  # the second link has no collision shape: it is checked as it looks
+    assert (only.link, robot.sources["envelopes"].grade) == (2, "inferred")
+    np.testing.assert_array_equal(only.points, robot.visuals[1].points)
     assert any("base" in note and "lost.stl is no file of a mesh" in note for note in imported.notes)
 
 

@@ -88,7 +88,7 @@ Columns = Annotated[
 ]
 Xacro = Annotated[list[str] | None, typer.Option(metavar="NAME:=VALUE", help="a xacro argument; can be repeated")]
 Srdf = Annotated[
-    Path | None, typer.Option(help="the SRDF of a URDF, whose state home, else the first of all joints, is home")
+    Path | None, typer.Option(help="the SRDF of a URDF, whose state home, else the first that is not singular, is home")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
 

@@ -55,8 +55,8 @@ def import_urdf(
     with shown_work(f"{file}: reading the arm"):
         imported = read_urdf(file, base=base, tip=tip, snap=snap, xacro=xacro or ())
     robot = imported.robot
-    if srdf is not None:
-        robot = robot.replace(home=srdf_home(srdf, imported.joints))
+    if srdf:
+        robot = robot.replace(home=srdf_home(srdf, robot, imported.joints))
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(robot.replace(name=output.stem), output)

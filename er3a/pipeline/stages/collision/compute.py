@@ -242,17 +242,17 @@ def _chosen(motions: list[ListedMotion]) -> tuple[Open, ...]:
 
 
 def _home(bodies: Bodies, given: Reals | None, free: Reals) -> tuple[model.HomeFrom, Reals]:
-    """Where places are joined to: the study's home, joints at 0 if that is within the limits and free of overlap, or
-    else one of the free joint vectors (k, n): of the ``HOMES`` nearest to the middle of the limits the one farthest
-    from singular."""
+    """Where places are joined to: the study's home, joints at 0 if that is free of overlap and no limit, where an
+    arm is folded up and few moves lead away, or else one of the free joint vectors (k, n): of the ``HOMES`` nearest to
+    the middle of the limits the one farthest from singular."""
     robot = bodies.robot
-    zero = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
+    zero = np.clip(0.0, robot.lower, robot.upper)
     if given is not None:
         return "study", given
-    if not len(free) or (not zero.any() and bodies.free(zero[None])[0]):
+    if not len(free) or ((robot.lower * robot.upper < 0).all() and bodies.free(zero[None])[0]):
         return "zero", zero
-    middle, half = (robot.lower + robot.upper) / 2, np.maximum(robot.upper - robot.lower, 1e-9) / 2
-    near = free[np.argsort(np.abs((free - middle) / half).max(axis=1), kind="stable")[:HOMES]]
+    away = np.abs(free - (robot.lower + robot.upper) / 2) / np.maximum(robot.upper - robot.lower, 1e-9)
+    near = free[np.argsort(away.max(axis=1), kind="stable")[:HOMES]]
     return "chosen", near[conditioning(robot, near).smallest_singular_value.argmax()]
 
 

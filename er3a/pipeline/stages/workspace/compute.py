@@ -89,7 +89,7 @@ def compute(study: Study, name: str) -> model.WorkspaceResults:
     grid = samples.grid
     settings, motion = study.section(WorkspaceSettings), study.section(TrajectorySettings)
     proven = prove_robot(robot, settings.proof_cells, study.seed)
-    voids = proven_voids(robot, proven, shoulder_of(robot, grid))
+    voids = proven_voids(robot, proven)
     scene = study.scene(name, "capability")
     assumed = shapes_assumed(robot, study.assumed_margin(name), {})
     margin = study.assumed_margin(name) if assumed else motion.penetration_tolerance_mm / 1000
