@@ -491,3 +491,21 @@ def test_an_entry_of_a_wrong_table_is_marked_in_both_arms(browser, small_study):
     browser.execute_script("arguments[0].click()", row)
     WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(OUTLINED) == "#cell-offset2")
     assert sorted(browser.execute_script(MARKED)) == ["mark right shown", "mark wrong shown"]
+
+
+@pytest.mark.parametrize(("shown", "boxes"), [("tray-1", [False, True, True]), ("hole-1", [True, True, False])])
+def test_boxes_below_the_reach_say_what_is_seen(browser, small_study, shown, boxes):
+    """A tray is shown without what is reachable, a void without the scene."""
+    browser.get((small_study.folder / "reports/er3a_c60/workspace.html").as_uri())
+    checked = "return [...document.querySelectorAll('#turning .key input')].map((box) => box.checked)"
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(checked) == [True] * 3)
+    browser.execute_script(f"document.querySelector(\".runs a[href='#{shown}']\").click()")
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(checked) == boxes)
+
+
+@pytest.mark.parametrize("name", ["box", "can", "box_far_off"])
+def test_errors_of_a_grasp_are_those_of_the_object_that_is_shown(browser, small_study, name):
+    browser.get((small_study.folder / "reports/er3a_c60/vision.html").as_uri())
+    browser.execute_script(f"document.querySelector(\".runs a[data-play='{name}']\").click()")
+    headings = "return [...document.querySelectorAll('.budget > :not([hidden]) h2')].map((each) => each.dataset.motion)"
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(headings) == [name])

@@ -109,12 +109,13 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
 def _errors(each: model.ObjectResult, limit: float) -> dict[str, Any]:
     """By how much the tool misses an object, and by what cause: bars to one scale, with the gripper's tolerance."""
     mm, deg, rows = each.error_mm, each.error_deg, list[ListRow]()
-    for part, cause in PARTS.items() if mm and deg else ():
-        off, scale = getattr(mm, part), 1.1 * max(limit, mm.together)
-        mark: Literal["pass", "fail", "none"] = "none" if rows else "pass" if off <= limit else "fail"
-        text = f"{fixed(off, 2)} mm, {fixed(getattr(deg, part), 2)}°"
-        parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
-        rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
+    if mm and deg:
+        for part, cause in PARTS.items():
+            off, scale = getattr(mm, part), 1.1 * max(limit, mm.together)
+            mark: Literal["pass", "fail", "none"] = "none" if rows else "pass" if off <= limit else "fail"
+            text = f"{fixed(off, 2)} mm, {fixed(getattr(deg, part), 2)}°"
+            parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
+            rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
     title = tr("{name}: error, 95 % │ tolerance {limit} mm", name=each.name, limit=f"{limit:g}")
     return {"of": each.name, "title": title, "rows": rows, "counted": False}
 
