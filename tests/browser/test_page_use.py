@@ -480,7 +480,7 @@ OUTLINED = "return document.querySelector('.entries a[data-shown]')?.hash"
 def test_what_is_to_be_done_next_is_shown_in_the_picture(browser, small_study):
     browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
     browser.execute_script("document.querySelector('.fix a').click()")
-    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(OUTLINED) == "#entry-direction1")
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(OUTLINED) == "#cell-direction1")
     assert sorted(browser.execute_script(MARKED)) == ["look shown", "turn shown"]
     assert "alpha 6" in browser.execute_script("return document.querySelector('.chip').textContent")
 
@@ -489,5 +489,23 @@ def test_an_entry_of_a_wrong_table_is_marked_in_both_arms(browser, small_study):
     browser.get((small_study.folder / "reports/er3a_c60_article/validation.html").as_uri())
     row = browser.find_element(By.CSS_SELECTOR, ".runs a[href='#cell-offset2']")
     browser.execute_script("arguments[0].click()", row)
-    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(OUTLINED) == "#entry-offset2")
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(OUTLINED) == "#cell-offset2")
     assert sorted(browser.execute_script(MARKED)) == ["mark right shown", "mark wrong shown"]
+
+
+@pytest.mark.parametrize(("shown", "boxes"), [("tray-1", [False, True, True]), ("hole-1", [True, True, False])])
+def test_boxes_below_the_reach_say_what_is_seen(browser, small_study, shown, boxes):
+    """A tray is shown without what is reachable, a void without the scene."""
+    browser.get((small_study.folder / "reports/er3a_c60/workspace.html").as_uri())
+    checked = "return [...document.querySelectorAll('#turning .key input')].map((box) => box.checked)"
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(checked) == [True] * 3)
+    browser.execute_script(f"document.querySelector(\".runs a[href='#{shown}']\").click()")
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(checked) == boxes)
+
+
+@pytest.mark.parametrize("name", ["box", "can", "box_far_off"])
+def test_errors_of_a_grasp_are_those_of_the_object_that_is_shown(browser, small_study, name):
+    browser.get((small_study.folder / "reports/er3a_c60/vision.html").as_uri())
+    browser.execute_script(f"document.querySelector(\".runs a[data-play='{name}']\").click()")
+    headings = "return [...document.querySelectorAll('.budget > :not([hidden]) h2')].map((each) => each.dataset.motion)"
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(headings) == [name])

@@ -448,11 +448,12 @@ def test_every_count_of_checks_is_of_one_scheme(study, stored, summaries, tmp_pa
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_entry_of_the_table_leads_to_its_evidence(study, stored, tmp_path, name):
+    """Its cell marks it in the picture, and the link below the table then leads to its row."""
     page = page_of(study, stored[name], tmp_path)
-    links = set(re.findall(r'href="#(entry-[a-z]+\d)"', page))
-    assert len(links) >= 6 * 7
-    for link in links:
-        assert page.count(f'id="{link}"') == 1
+    entries = set(re.findall(r'href="#cell-([a-z]+\d)"', page))
+    assert len(entries) >= 6 * 7
+    for place in ("marks", *(f"{kind}-{entry}" for kind in ("cell", "entry") for entry in entries)):
+        assert page.count(f'id="{place}"') == 1
 
 
 def test_a_reach_that_documents_contradict_each_other_about_is_drawn_and_asked_for(study, stored, tmp_path):
@@ -462,6 +463,8 @@ def test_a_reach_that_documents_contradict_each_other_about_is_drawn_and_asked_f
         (address,) = re.findall(rf'class="button" href="#({shown})"', page)
         assert page.count(f'id="{address}"') == 1
         assert ("592.8 or 600.0 mm?</span>" in page) == (address == "seen")
+        summed = re.findall(r'href="#cell-(\w+)" data-asked="seen"', page)
+        assert summed == (["a2", "a3", "d4"] if address == "seen" else [])
 
 
 @pytest.mark.long

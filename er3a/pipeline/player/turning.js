@@ -19,7 +19,6 @@ const [canvas, key, knife] = ["canvas", ".key", ".cut"].map((name) => place.quer
 const [low, high] = data.box.map((corner) => scaled(corner, 1e-3)); // m
 const size = subtract(high, low);
 const middle = scaled(add(low, high), 0.5);
-const left = new Set(); // names of what is not shown
 let awaited = false;
 
 const space = new Space(canvas, middle, data.filled * Math.hypot(...size), refresh);
@@ -30,6 +29,7 @@ const whole = space.distance;
 Object.assign(space, { azimuth: data.azimuth, elevation: data.elevation });
 
 const all = [...layers, ...solids];
+const unlisted = all.filter(({ address }) => !address);
 const chosen = () => all.find(({ address }) => address && address === location.hash.slice(1));
 const first = all.find(({ address }) => address === "tray-1");
 
@@ -38,12 +38,13 @@ function placeOf({ points, shapes }) {
   return points ? points.reduce((a, b) => (b[2] > a[2] ? b : a)) : add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
 }
 
-/** Turns the picture until what the address names is before the rest; a tray with the arm in it, from its side, a void without what is around. */
+/** Turns the picture until what the address names is before the rest: a tray from its side, with the arm in it, first without what is reachable; a void first without what is around. */
 function face() {
   const at = placeOf(chosen());
   const [[x, y], near] = [subtract(at, middle), Boolean(chosen().shapes)];
   const about = Math.hypot(x, y) < 0.1 * size[0]; // axis 1
   Object.assign(space, { azimuth: about ? data.azimuth : Math.atan2(y, x) + (near ? 0.9 : 0.35), elevation: 0.35, distance: (near || about ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
+  for (const each of unlisted.filter((each) => each !== solids[0])) each.check.checked = Boolean(each.shapes) === near;
   refresh();
 }
 
@@ -99,37 +100,34 @@ function draw() {
   space.begin();
   space.floor(middle, size[0] / FLOOR, data.floor);
   const [shown, near] = [chosen(), chosen()?.shapes];
-  const isSeen = (each) => !left.has(each.name) && (each === solids[0] || (each.shapes ? !shown?.points && (!each.address || each === (near ? shown : first)) : !near));
+  const isSeen = (each) => each.check?.checked ?? (each.shapes ? !shown?.points && each === (near ? shown : first) : !near);
   const arm = near && shown.reached.length ? shown.reached : solids[0].poses;
   for (const each of all) for (const part of each.parts) part.visible = isSeen(each);
   for (const each of solids.filter(isSeen)) {
-    const hiding = each === solids[0] ? new Set() : space.hiding(each.parts, arm);
-    space.place(each.parts, each === solids[0] ? arm : each.poses, new Map(), (part) => each !== shown && hiding.has(part));
+    const hiding = each === solids[0] || each === shown ? new Set() : space.hiding(each.parts, arm);
+    space.place(each.parts, each === solids[0] ? arm : each.poses, new Map(), (part) => hiding.has(part));
+    for (const part of hiding) part.visible = Boolean(near || each.address); // before the arm at 0 it would look like contact
   }
   const named = all.filter((each) => each.address && isSeen(each));
   space.keepClear(alongArm(arm), ARM * size[0]);
   for (const each of named) space.keepClear(each.points?.filter((_, i) => i % SPARSE === 0) ?? [placeOf(each)], each.points ? 0 : ARM * size[0]);
-  for (const [from, to, text] of near ? shown.ways : solids[0].ways) {
+  for (const [from, to, text] of shown ? (shown.ways ?? []) : solids[0].ways) {
     space.line([from, to], space.page.accent, 3);
     space.keepClear([...Array(21).keys()].map((i) => add(scaled(from, 1 - i / 20), scaled(to, i / 20))), 0);
     space.word(text, add(scaled(from, 0.4), scaled(to, 0.6)), space.page.accent);
   }
   for (const each of named) space.word(each.name, placeOf(each), each === shown ? space.page.accent : space.page.ink);
-  for (const each of solids.slice(1).filter((each) => !each.address && isSeen(each))) space.names(each.parts);
+  for (const each of solids.slice(1).filter((each) => !each.address && isSeen(each))) space.names(each.parts.filter(({ visible }) => visible));
   space.end();
   place.toggleAttribute("data-drawn", true);
 }
 
 // What no list of the page names, each with its colour and a box to leave it out.
-for (const { name, colour } of all.filter(({ address }) => !address)) {
+for (const each of unlisted) {
   const [label, check, swatch] = ["label", "input", "i"].map((tag) => document.createElement(tag));
-  Object.assign(check, { type: "checkbox", checked: !left.has(name) });
-  check.addEventListener("change", () => {
-    left[check.checked ? "delete" : "add"](name);
-    refresh();
-  });
-  swatch.style.background = colour;
-  label.append(check, swatch, ` ${name}`);
+  each.check = Object.assign(check, { type: "checkbox", checked: true, onchange: refresh });
+  swatch.style.background = each.colour;
+  label.append(check, swatch, ` ${each.name}`);
   key.append(label);
 }
 

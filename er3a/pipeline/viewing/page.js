@@ -755,12 +755,14 @@ addEventListener("click", keepPlace, true);
 addEventListener("player", returnToPlace);
 returnToPlace();
 
-// What an entry of a table is of is marked in the picture: of the address, or under the pointer.
+// What an entry of a table is of is marked in the picture: of the address, or under the pointer. What the address asks for
+// together is marked in the table.
 const entryOf = (hash) => hash?.slice(1).replace(/^(cell|entry)-/, "") || null;
 const entryLinks = document.querySelectorAll(".runs a[href^='#cell-'], .grid .entries a");
 function showEntry(entry = entryOf(location.hash)) {
+  for (const link of document.querySelectorAll(".grid .key > a")) link.hash = document.getElementById(`entry-${entry}`)?.id ?? "marks";
   for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
-  for (const link of entryLinks) link.toggleAttribute("data-shown", entryOf(link.hash) === entry);
+  for (const link of entryLinks) link.toggleAttribute("data-shown", [entryOf(link.hash), link.dataset.asked].includes(entry));
 }
 for (const link of entryLinks) {
   link.addEventListener("pointerenter", () => showEntry(entryOf(link.hash)));

@@ -104,7 +104,7 @@ def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
     steps = (
         (N_("Jog each joint: turns as drawn?"), ("direction",), "cell-direction1"),
         (N_("Read five poses, for {names}"), (*CONTINUOUS, "beta"), "poses"),
-        (N_("Enter limits and speeds from the controller"), LIMITS, "cell-lower1"),
+        (N_("Enter limits and speeds from the controller"), LIMITS, "limits"),
     )
     rows = []
     for text, kinds, place in steps:
@@ -173,10 +173,9 @@ def _gives(each: EntryEvidence, evidence: TableEvidence) -> str:
     found, kind = evidence.other, column_of(each.entry)
     if found is None or (found.code == "described") != (each.status == "contradicted"):
         return ""
-    if kind not in (*OTHER_COLUMNS, *LIMITS) or (found.code == "allowed" and kind in LIMITS):
-        return ""
+    given = kind in OTHER_COLUMNS or (found.code != "allowed" and kind in LIMITS)
     value = _other_value(found, each)
-    return _plain(value) if abs(value - (each.value or 0.0)) > DIFFERS else ""
+    return _plain(value) if given and abs(value - (each.value or 0.0)) > DIFFERS else ""
 
 
 def _alone(each: EntryEvidence) -> str:
@@ -212,11 +211,15 @@ def _cell(robot: Robot, each: EntryEvidence | None, evidence: TableEvidence) -> 
     """An entry in the table; where evidence contradicts one that its own source doesn't state there is no value."""
     if each is None or each.value is None:
         return None
-    title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
-    gives = _gives(each, evidence) or _alone(each)
     unstated = each.status == "contradicted" and robot.origins.get(each.entry) == NO_DOCUMENT
-    value = "–" if unstated else _value(each)
-    return dict(entry=each.entry, value=value, status=each.status, mark=MARKS[each.status], title=title, gives=gives)
+    return dict(
+        entry=each.entry,
+        value="–" if unstated else _plain(each.value),
+        status=each.status,
+        mark=MARKS[each.status],
+        title=tr("{entry}: {status}", entry=each.entry, status=_status(each.status)),
+        gives=_gives(each, evidence) or _alone(each),
+    )
 
 
 def _marked(status: Status) -> str:
@@ -228,20 +231,16 @@ def _status(status: Status) -> str:
     return word("status", STATUS_WORDS, status)
 
 
-def _value(each: EntryEvidence) -> str:
-    return _plain(each.value) if each.value is not None else ""
-
-
-def _plain(value: float) -> str:
-    return fixed(value, 3).rstrip("0").rstrip(".")
+def _plain(value: float, digits: int = 3) -> str:
+    return fixed(value, digits).rstrip("0").rstrip(".")
 
 
 def _row(each: EntryEvidence) -> list[str]:
     return [
         each.entry,
-        with_unit(_value(each), each.unit),
+        with_unit(_plain(each.value or 0.0), each.unit),
         _marked(each.status),
-        _interval(each) if each.interval and each.status != "gauge" else "–",
+        _interval(each),
         joined(each.by, ", ") or "–",
     ]
 
@@ -261,24 +260,24 @@ def _tool_off(each: EntryEvidence) -> str:
 
 
 def _interval(each: EntryEvidence) -> str:
-    if each.interval is None:
+    if each.interval is None or each.status == "gauge":
         return "–"
-    low, high = (fixed(value, 2).rstrip("0").rstrip(".") for value in each.interval)
+    low, high = (_plain(value, 2) for value in each.interval)
     if column_of(each.entry) == "direction":
         return tr("{low} or {high}", low=low, high=high) if low != high else low
     if each.status in ("consistent", "open"):
         return tr("anything")
-    if each.at_least:
-        return tr("at least {low} to {high}", low=low, high=with_unit(high, each.unit))
-    return tr("{low} to {high}", low=low, high=with_unit(high, each.unit))
+    text = tr("{low} to {high}", low=low, high=with_unit(high, each.unit))
+    return tr("at least {off}", off=text) if each.at_least else text
 
 
 def _off(mm: float, deg: float) -> str:
-    if fixed(mm, 1) == "0.0":  # of a turn in place, which "0.0 mm" would make look harmless
-        return tr("turned by {deg}°", deg=fixed(deg, 0 if deg >= 10 else 1))
-    if fixed(deg, 1) == "0.0":
-        return with_unit(fixed(mm, 0 if mm >= 10 else 1), "mm")
-    return tr("{mm} mm, {deg}°", mm=fixed(mm, 0 if mm >= 10 else 1), deg=fixed(deg, 0 if deg >= 10 else 1))
+    far, turned = (fixed(value, 0 if value >= 10 else 1) for value in (mm, deg))
+    if far == "0.0":  # of a turn in place, which "0.0 mm" would make look harmless
+        return tr("turned by {deg}°", deg=turned)
+    if turned == "0.0":
+        return with_unit(far, "mm")
+    return tr("{mm} mm, {deg}°", mm=far, deg=turned)
 
 
 def _fits(each: EntryEvidence) -> str:

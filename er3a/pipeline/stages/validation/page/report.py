@@ -69,9 +69,9 @@ BELOW = 0.15  # of a reach: from one line to the next below the base
 LABELLED = 5  # of the lengths that are wrong, at most, so that words have room
 JOG = np.radians(30.0)  # of a joint that one looks at
 VIEWS = {  # which of x, y and z are to the right and upwards for one who looks from there, and their signs
+    N_("from above"): ([1, 0], [-1, 1]),
     N_("from behind"): ([1, 2], [-1, 1]),
     N_("from the side"): ([0, 2], [1, 1]),
-    N_("from above"): ([1, 0], [-1, 1]),
 }
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
@@ -101,11 +101,9 @@ def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
 def check_row(check: Judged) -> list[str]:
     """A check in the columns of ``COLUMNS``."""
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
-    if check.source is not None and check.grade is not None:
-        grade = word("grade", GRADE_NAMES, check.grade)
-        source = bracketed(own_title(check.source), grade)
-    else:
-        source = tr("the model itself")
+    source = tr("the model itself")
+    if check.source and check.grade:
+        source = bracketed(own_title(check.source), word("grade", GRADE_NAMES, check.grade))
     return [say(check.subject), *values, f"{check.tolerance:g}", unit_sign(check.unit), source]
 
 
@@ -119,25 +117,40 @@ def _value(value: float, check: model.Check) -> str:
 def report(study: Study, stored: Stored[model.ValidationResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, summary = stored.robot, stored.results.summary
-    robot, checks = model.model_of(study, name), summary.checks
-    judged = [check for check in checks if not isinstance(check, model.Unjudged)]
+    robot = model.model_of(study, name)
+    judged = [check for check in summary.checks if not isinstance(check, model.Unjudged)]
     failed = sorted((each for each in judged if each.status == "fail"), key=lambda each: -each.tolerances_off)
     source = robot.sources.get("dh")
     table = robot_of(study.table(name)).replace(name=name)
     corrected, _ = diagnosis_section.corrected_robot(table, summary.diagnoses)
-    file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
-    text = robot_text(file) if file else ""
+    text = robot_text(robot_file(corrected)) if corrected and not summary.is_beyond_correction else ""
     instead = alternative_table(study, stored) if summary.verdict.status == "fail" else None
     evidence = evidence_section(robot, summary.evidence)
     disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
+    q, summed = np.zeros(robot.joints), list[str]()
+    for each in disputed[:1]:
+        reach = AxisDistance(**each.subject.params)
+        found, q = search(robot, reach, REACH_STARTS)
+        without = [
+            (f"{kind}{k}", robot.replace(**{kind: getattr(robot, kind) * row}))
+            for k, row in enumerate(1 - np.eye(robot.rows), 1)
+            for kind in "ad"
+        ]
+        # Without a length that makes it, the reach is another.
+        summed = [entry for entry, arm in without if not np.isclose(1000 * reach.measure(frames(arm, q)), found)]
     render_stage(
         study,
         stored,
         output,
         _answer(study, name, summary, instead, disputed),
         arms=_both_arms(
-            robot, study.robot(instead) if instead else other_robot(robot, summary.evidence), evidence or {}, disputed
+            robot,
+            study.robot(instead) if instead else other_robot(robot, summary.evidence),
+            evidence or {},
+            disputed,
+            q,
         ),
+        summed=summed,
         at_side=True,
         plain_table=None if evidence else plain_table(robot),
         robot=robot,
@@ -156,7 +169,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
 
 
 def _both_arms(
-    robot: Robot, other: Robot | None, evidence: Mapping[str, Any], disputed: Sequence[model.Conflict]
+    robot: Robot, other: Robot | None, evidence: Mapping[str, Any], disputed: Sequence[model.Conflict], q: Reals
 ) -> Markup:
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
     scale.
@@ -165,9 +178,6 @@ def _both_arms(
     is marked while it is asked for, with what the other arm has instead. Where documents contradict each other about a
     reach, the arm is stretched, and what each states is a dimension from axis 1 on below it, with its source; that of
     the table in its colour."""
-    q = np.zeros(robot.joints)
-    for each in disputed[:1]:
-        q = search(robot, AxisDistance(**each.subject.params), REACH_STARTS)[1]
     arms = [seen_arm(robot, tr("This table"), tr("stretched out") if disputed else "", q=q)]
     if other is not None:
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), q=q))
@@ -263,6 +273,7 @@ def _answer(
     if disputed:
         off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)
         keys[0] = tr("{far} of difference", far=off), tr("between documents")
+    fix = None
     if instead:
         fix = Fix(
             tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),
@@ -279,8 +290,6 @@ def _answer(
         fix = Fix(say(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
         fix = Fix(tr("read five poses at the pendant: er3a confirm {robot} --plan", robot=robot), instead=False)
-    else:
-        fix = None
     return Answer(headline, rest, below, keys, (), fix)
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -107,20 +106,18 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
 
 
-def _errors(name: str, mm: model.ErrorParts, deg: model.ErrorParts, limit: float, moment: tuple[str, float]) -> Group:
-    """What the gripper tolerates, by how much the tool misses an object, and by what cause: bars to one scale."""
-    longest = max(limit, mm.together)
-    whole: list[Part] = [Part(0.0, 1.0, "none")]
-    rows = [
-        ListRow("none", tr("gripper's tolerance"), with_unit(f"{limit:g}", "mm"), "", moment, limit / longest, whole)
-    ]
-    for part, cause in PARTS.items():
-        off = getattr(mm, part)
-        text = f"{fixed(off, 2)} mm, {fixed(getattr(deg, part), 2)}°"
-        rows.append(ListRow("none", tr(cause), text, "", moment, off / longest, whole))
-    good: Literal["pass", "fail"] = "pass" if mm.together <= limit else "fail"
-    rows[1] = replace(rows[1], mark=good, parts=[Part(0.0, 1.0, good)])
-    return Group(tr("Greatest error, 95 %: {name}", name=name), rows, counted=False)
+def _errors(each: model.ObjectResult, limit: float) -> dict[str, Any]:
+    """By how much the tool misses an object, and by what cause: bars to one scale, with the gripper's tolerance."""
+    mm, deg, rows = each.error_mm, each.error_deg, list[ListRow]()
+    if mm and deg:
+        for part, cause in PARTS.items():
+            off, scale = getattr(mm, part), 1.1 * max(limit, mm.together)
+            mark: Literal["pass", "fail", "none"] = "none" if rows else "pass" if off <= limit else "fail"
+            text = f"{fixed(off, 2)} mm, {fixed(getattr(deg, part), 2)}°"
+            parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
+            rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
+    title = tr("{name}: error, 95 % │ tolerance {limit} mm", name=each.name, limit=f"{limit:g}")
+    return {"of": each.name, "title": title, "rows": rows, "counted": False}
 
 
 AXES = ("x", "y", "z")
@@ -144,6 +141,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         stored,
         output,
         answer,
+        errors=[_errors(each, min(task.gripper.tolerance_mm)) for each in summary.objects],
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
@@ -176,25 +174,22 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
     if summary.verdict.status == "caution":  # what was not checked comes before both
         below, rest = rest, ""
     keys, limit = [], min(task.gripper.tolerance_mm)
-    measured = [(each.error_mm, each.error_deg, each) for each in grasped if each.error_mm and each.error_deg]
-    worst = max(measured, key=lambda found: found[0].together, default=None)
-    if worst:
+    sure = [(each.grasp.probability, each.error_mm, each.name) for each in grasped if each.grasp and each.error_mm]
+    if sure:
+        least, error, name = min(sure, key=lambda each: each[0])
         made = (
             tr("error at the grasp, 95 %, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
         )
-        keys = [(with_unit(f"{fixed(worst[0].together, 1)} / {limit:g}", "mm"), made)]
-    if found:
+        keys = [(_succeed(least), name), (with_unit(f"{fixed(error.together, 1)} / {limit:g}", "mm"), made)]
+    elif found:
         half = fixed(max(found.hand_eye.half_width_mm), 2)
         place = f"{_listed(found.hand_eye.xyz_mm, 0)} ± {half}"
-        keys.insert(0, (with_unit(place, "mm"), tr("camera's place, 95 %")))
+        keys = [(with_unit(place, "mm"), tr("camera's place, 95 %"))]
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [
         Group(tr("Can't be grasped"), [row for row in shown if row.mark == "fail"]),
         Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
-    if worst:
-        mm, deg, each = worst
-        groups.append(_errors(each.name, mm, deg, limit, grasp_moment(results, each)))
     if found and (found.suspects or found.warnings):
         rows = [ListRow("caution", each.sample, _why_left_out(each), "#figure-residuals") for each in found.suspects]
         rows += [ListRow("caution", tr("camera"), say(each)) for each in found.warnings]
@@ -208,9 +203,11 @@ def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
     """An object: how surely it is grasped, or why it is not."""
     if each.grasp is None:
         return ListRow("fail", each.name, refusal_text(each), "#objects", moment)
-    sure = each.grasp.probability
-    note = tr("{percent} % succeed", percent=fixed(100 * sure, 1))
-    return ListRow("pass", each.name, note, "#objects", moment)
+    return ListRow("pass", each.name, _succeed(each.grasp.probability), "#objects", moment)
+
+
+def _succeed(probability: float) -> str:
+    return tr("{percent} % succeed", percent=fixed(100 * probability, 1))
 
 
 def _why_left_out(found: Finding) -> str:

@@ -69,9 +69,12 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
     """How far the arm reaches, its voids, where the tray goes, and the ``payload`` where no other page says it."""
     reach, volume = summary.reach_m, summary.volume_m3
     rest, fix, rows = "", None, _tray_as_rows(placing)
+    if summary.voids:
+        rest = tr("Voids: {count}.", count=len(summary.voids))
     if placing and rows[0].mark == "pass":
         tray = placing.tray
-        rest, centre = whole_sentence(tr("{tray} fits", tray=tray.name)), millimetres(tray.place.centre_m)
+        centre = millimetres(tray.place.centre_m)
+        rest = joined([rest, whole_sentence(tr("{tray} fits", tray=tray.name))], " ")
         fix = Fix(tr("add the tray and its stand to the scene at {centre} mm.", centre=centre), "#tray-1", False)
     keys = [
         (

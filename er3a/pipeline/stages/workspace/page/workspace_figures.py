@@ -50,14 +50,8 @@ def _filled(proof: model.ProofCells, rho: Reals, azimuth: Reals, z: float) -> Fl
     for row in np.flatnonzero((proof.z_m[:, 0] <= z) & (z < proof.z_m[:, 1])):
         ring = (rho >= proof.rho_m[row, 0]) & (rho < proof.rho_m[row, 1])
         arcs = np.concatenate([proof.empty_arcs_deg[row], proof.unfilled_arcs_deg[row]])
-        found[ring] = ~_on_arcs(azimuth[ring], arcs)
-    return found
-
-
-def _on_arcs(azimuth: Reals, arcs: Reals) -> Flags:
-    found = np.zeros(len(azimuth), dtype=bool)
-    for low, high in zip(arcs[::2], arcs[1::2]):
-        found |= (low <= azimuth) & (azimuth <= high)
+        at = azimuth[ring, None]
+        found[ring] = ~((arcs[::2] <= at) & (at <= arcs[1::2])).any(axis=1)
     return found
 
 
