@@ -128,7 +128,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
     text = robot_text(file) if file else ""
     instead = alternative_table(study, stored) if summary.verdict.status == "fail" else None
-    evidence = evidence_section(robot, summary.evidence)
+    evidence = evidence_section(summary.evidence)
     disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
     render_stage(
         study,
