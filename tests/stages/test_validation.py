@@ -487,7 +487,7 @@ def test_an_open_entry_has_both_its_values_in_every_table(summaries):
         evidence = summaries[name].evidence
         shown = {
             cell["entry"]: (cell["value"], cell["gives"])
-            for _, cells in evidence_section(load_robot(name), evidence)["rows"]
+            for _, cells in evidence_section(evidence)["rows"]
             for cell in cells
             if cell and cell["status"] == "open"
         }
@@ -501,7 +501,7 @@ def test_what_evidence_leaves_open_of_a_contradicted_length_is_that_of_the_real_
     rows = yaml.safe_load((ROBOTS / "er3a_c60.yaml").read_text())["dh"]["rows"]
     real = {f"{key}{row['joint']}": row[f"{key}_mm"] for row in rows for key in "ad"}
     evidence = summaries["er3a_c60_article"].evidence
-    shown = {row[0]: row for row in evidence_section(load_robot("er3a_c60_article"), evidence)["open_rows"]}
+    shown = {row[0]: row for row in evidence_section(evidence)["open_rows"]}
     contradicted = {each.entry for each in evidence.entries if each.status == "contradicted"}
     assert contradicted & real.keys() == {"a1", "a2", "a3", "d1", "d4", "d6"}
     for name in contradicted & real.keys():

@@ -68,7 +68,7 @@ def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
         else tr("{count} not settled", count=len(evidence.unconfirmed))
     )
     mark: Mark = "fail" if bad else "caution" if evidence.unconfirmed else "pass"
-    title, entries = own_title(robot.title), evidence_section(robot, evidence)
+    title, entries = own_title(robot.title), evidence_section(evidence)
     return Tile(tr("Which numbers are wrong?"), answer, title, mark, f"{name}/validation.html", entries)
 
 

@@ -137,7 +137,7 @@ function draw() {
     const times = [from, ...motion.times.filter((time) => time > from && time < until), Math.min(until, end())];
     space.line(times.map((time) => column(posesOf(arms[0], valuesAt(motion.times, motion.values[0], time)).at(-1), 3)), data.colours[status], 5);
   }
-  const axes = poses.flatMap((own) => [0, 1, 2].map((c) => [column(own.at(-1), 3), add(column(own.at(-1), 3), scaled(column(own.at(-1), c), 0.09 * data.size))]));
+  const axes = (wrong ? [] : poses).flatMap((own) => [0, 1, 2].map((c) => [column(own.at(-1), 3), add(column(own.at(-1), 3), scaled(column(own.at(-1), c), 0.09 * data.size))]));
   axes.forEach((axis, i) => space.line(axis, data.axes[i % 3], 3));
   const worst = GRAVEST.find((status) => now.some((event) => event.status === status)); // what comes with it is not named
   for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j]);

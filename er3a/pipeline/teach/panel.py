@@ -17,7 +17,14 @@ from er3a.collision.triangles import TriangleTree
 from er3a.files.vision_file import load_vision
 from er3a.finding import fact
 from er3a.kinematics.forward import frames
-from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length, wrist_and_forearm
+from er3a.kinematics.singularity import (
+    TYPES,
+    USUAL_NEAR,
+    NearSingular,
+    characteristic_length,
+    conditioning,
+    wrist_and_forearm,
+)
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import has_branches, wrist_partition_missing
 from er3a.numerics.arrays import Reals
@@ -205,12 +212,10 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     validated = results / name / "validation"
     known = is_computed(validated)
     first_caveat = caveat(read_foundation(validated) if known else "not_computed")
-    near = near_singular(study.section(TrajectorySettings))
-    inputs = input_records(study.inputs(name, "teach"))
     write_panel(
         study.robot(name),
         output,
-        near=near,
+        near=near_singular(study.section(TrajectorySettings)),
         scene=study.scene(name, "trajectory"),
         home=_home(study, name),
         robots=robots_with(study, "teach"),
@@ -219,7 +224,9 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         head=program_head(validated if known else None),
         condition=condition_of(validated) if known else "",
         command=run_command(study, f"{name}/teach.html"),
-        provenance=Provenance(inputs, code_digest(), config=study.settings(name, "trajectory")),
+        provenance=Provenance(
+            input_records(study.inputs(name, "teach")), code_digest(), config=study.settings(name, "trajectory")
+        ),
     )
 
 
@@ -250,15 +257,16 @@ def write_panel(
     Parameters
     ----------
     near : where the panel warns of a singularity
-    home : (n,), rad or m, that the panel opens at; None for that of the robot's file, or else joints at 0, and those
-        whose limits leave 0 out in the middle of them
+    home : (n,), rad or m, that the panel opens at; None for that of the robot's file, or else joints in the middle of
+        their limits, but for the one that turns the arm farthest from singular
     robots, robot_pages : of the study: arms with a panel (name, title, address), and this arm's other pages
     first_caveat : what to know of its table, if anything; condition : what of it has to be confirmed
     head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
-    rest = np.where((robot.lower < 0) & (robot.upper > 0), 0.0, (robot.lower + robot.upper) / 2)
-    opened = np.clip(next((q for q in (home, robot.home) if q is not None), rest), robot.lower, robot.upper)
+    tried = (robot.lower + robot.upper) / 2 + np.diag(robot.upper - robot.lower) / 4
+    regular = tried[conditioning(robot, tried).smallest_singular_value.argmax()]
+    opened = np.clip(next(q for q in (home, robot.home, regular) if q is not None), robot.lower, robot.upper)
     panel = own | {
         "programs": own["programs"] and not (first_caveat and first_caveat.status == "fail"),
         "scene": drawn_scene(scene.solids if scene else (), robot),
@@ -266,7 +274,7 @@ def write_panel(
         "floor": floor_of(scene),
         "clearance": clearance_data(robot, scene),
         "home": opened.tolist(),
-        "head": [ascii_text(line) for line in (program_head(None) if head is None else head)],
+        "head": [*map(ascii_text, program_head(None) if head is None else head)],
     }
     render(
         _HERE / "teach.html.j2",
@@ -384,4 +392,4 @@ def _translated(words: Any) -> Any:
     """The words, nested as they are, in the page's language."""
     if isinstance(words, dict):
         return {key: _translated(word) for key, word in words.items()}
-    return [_translated(word) for word in words] if isinstance(words, list) else tr(words)
+    return [*map(_translated, words)] if isinstance(words, list) else tr(words)

@@ -30,7 +30,7 @@ export class ArmView extends Space {
     if (ghost) this.other.show(this.#poses(ghost), new Map(), look, true);
     else this.other.hide();
     const hiding = this.hiding(this.surroundings, poses);
-    this.place(this.surroundings, [WORLD], colours, (mesh) => hiding.has(mesh));
+    this.place(this.surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) || mesh.shape.large);
     this.keepClear(alongArm(poses), ARM * reach);
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
     else this.#axes(poses);

@@ -117,18 +117,19 @@ def answer_of(
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
     faulty, others = paths[: len(wrong)], paths[len(wrong) :]
-    fault_rows = {}
+    fault_rows, repairable = {}, []
     for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
         fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
-    repairable = [fault_rows[path.name] for path in faulty if path.chosen and path.name not in hindered]
+        if path.chosen and path.name not in hindered:
+            repairable.append(replace(fault_rows.pop(path.name), mark="caution"))
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
         replace(_sound_row(path), mark="fail", note=as_expected(path))
         for path in others
         if path.expect and not is_met(path)
     ]
-    rows = [*unlike, *(row for row in fault_rows.values() if row not in repairable)]
+    rows = [*unlike, *fault_rows.values()]
     groups = judged([*rows, *map(_sound_row, sound)], repairable)
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))

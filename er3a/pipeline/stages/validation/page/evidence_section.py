@@ -20,7 +20,6 @@ from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.pipeline.viewing.answer import ListRow
 from er3a.pipeline.viewing.page import panel_link
 from er3a.references.quantities import MM
-from er3a.references.reference import NO_DOCUMENT
 from er3a.references.seen import TOWARD
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -64,7 +63,7 @@ DIFFERS = 2e-3
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 
 
-def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
+def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
     legend, and the entries in words; rows of entries begin with the name, which is the address on the page. Those
     not settled come by how far the tool may be off, then those without a bound, then those that don't move it;
@@ -83,7 +82,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     first = [ListRow("fail", entry_word(each.entry), _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
-        rows=[(joint, [_cell(robot, by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
+        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
         legend=[
             (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))
             for status in MARKS
@@ -207,14 +206,13 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(robot: Robot, each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
-    """An entry in the table; where evidence contradicts one that its own source doesn't state there is no value."""
+def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
+    """An entry in the table; None where there is none."""
     if each is None or each.value is None:
         return None
-    unstated = each.status == "contradicted" and robot.origins.get(each.entry) == NO_DOCUMENT
     return dict(
         entry=each.entry,
-        value="–" if unstated else _plain(each.value),
+        value=_plain(each.value),
         status=each.status,
         mark=MARKS[each.status],
         title=tr("{entry}: {status}", entry=each.entry, status=_status(each.status)),

@@ -125,7 +125,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     corrected, _ = diagnosis_section.corrected_robot(table, summary.diagnoses)
     text = robot_text(robot_file(corrected)) if corrected and not summary.is_beyond_correction else ""
     instead = alternative_table(study, stored) if summary.verdict.status == "fail" else None
-    evidence = evidence_section(robot, summary.evidence)
+    evidence = evidence_section(summary.evidence)
     disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
     q, summed = np.zeros(robot.joints), list[str]()
     for each in disputed[:1]:

@@ -51,8 +51,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
 
 
 def _labelled(study: Study, stored: Stored[model.WorkspaceResults], contradicted: bool) -> Markup | None:
-    """The arm in what it reaches, with names, and where it is contradicted the one to use instead; None of an arm that
-    slides along its first axis."""
+    """The arm in what it reaches, with names, and where it is contradicted the one to use instead, over the floor of
+    this one's scene; None of an arm that slides along its first axis."""
     kind: Kind = "wrong" if contradicted else "right"
     arms = [(study.robot(stored.robot), stored.results, kind)]
     instead = alternative_table(study, stored) if contradicted else None
@@ -60,8 +60,8 @@ def _labelled(study: Study, stored: Stored[model.WorkspaceResults], contradicted
         arms.insert(0, (study.robot(instead), right.results, "right"))
     if any(each.summary.proof.bars or each.summary.is_flat for _, each, _ in arms):
         return None
-    floor = floor_of(study.scene(stored.robot, "capability"))
-    floor_mm = None if floor is None else 1000 * (floor - float(arms[-1][0].base[2, 3]))
+    floor = floor_of(study.scene(instead or stored.robot, "capability"))
+    floor_mm = None if floor is None else 1000 * (floor - arms[-1][0].base[2, 3])
     return workspace_figures.labelled(arms, floor_mm)
 
 
