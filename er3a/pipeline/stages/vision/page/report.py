@@ -136,6 +136,8 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     found, scene = summary.calibration, study.scene(name, stored.stage)
     task = load_vision(str(study.entry(name).vision))
     robot, answer = study.robot(name), _answer(results, task)
+    rows = [row for group in answer.shown_groups for row in group.rows]
+    first = "fail" if summary.verdict.status == "fail" else "pass"  # else what is not grasped is not to be
     render_stage(
         study,
         stored,
@@ -154,7 +156,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
             robot,
             motions(robot, results, task),
             scene,
-            opened=next((group.rows[0].play for group in answer.shown_groups), None),
+            opened=min(rows, key=lambda row: row.mark != first).play if rows else None,
             added=seen_shapes(robot, task, summary),
         ),
         drawing_head=drawing_head(),
