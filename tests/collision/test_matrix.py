@@ -387,6 +387,7 @@ def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes()
     assert Bodies(swollen.replace(pair_rules=allowed), None).in_error == ()
 
 
+@pytest.mark.long  # kernels of surfaces take half a minute to compile
 @pytest.mark.parametrize(("inner", "adjacent"), [(0.0493, True), (0.046, False)])
 def test_housings_that_turn_in_each_other_are_adjacent(inner, adjacent):
     """A ball on link 6 in an open shell on link 4, both about the wrist's centre: apart by less than 1 mm, or more."""

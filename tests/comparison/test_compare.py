@@ -758,6 +758,7 @@ def test_the_one_chain_of_a_urdf_with_as_many_joints_as_the_table_is_taken(tmp_p
     assert tip_after(path, None, joints) == tip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("names", [("irb1600_6_12", "irb2400"), ("puma560", "irb140")])
 def test_the_alignment_found_is_the_least_wherever_the_search_begins(names):
     """Base, flange and zeros are free, and the last bit of a number says nothing: the distance left is the same."""
