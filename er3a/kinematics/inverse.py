@@ -70,7 +70,7 @@ def inverse(
     redundancy : (k,), values of the redundancy parameters (``parameters_of``): an arm angle in rad, or a joint's value;
         None means those of ``q_ref``; where a pose has no rows, the nearest value at which it has some is taken
     self_motion_rows : for an arm with one redundancy parameter, add for each self-motion the member nearest to
-        ``q_ref`` and the one with the largest limit margin as rows; done too where no value tried has rows within limits
+        ``q_ref`` and the one with the largest limit margin as rows; done too where no value tried has rows inside
 
     Returns
     -------
