@@ -13,8 +13,9 @@ def paint(corners: Reals, colours: Reals, image: Reals, near: Reals) -> None:
     Parameters
     ----------
     corners : (n, 3, 3), x, y in px of the image and 1 / depth, of each corner of each triangle; depth 0 or less: none
-    colours : (n, 4), red, green, blue, each times alpha, and alpha, 0 to 1; only 1 covers what is painted later
-    image : (h, w, 4), the same, painted on
+    colours : (n, 4), red, green, blue, each times alpha, and alpha, 0 to 1; only 1 covers what is painted later; of a
+        shadow alpha alone, (n, 1)
+    image : (h, w, 4) or (h, w, 1), the same, painted on
     near : (h, w), 1 / depth of what is seen there, 0 where nothing is
     """
     height, width = near.shape
@@ -33,7 +34,7 @@ def paint(corners: Reals, colours: Reals, image: Reals, near: Reals) -> None:
                 z = u * az + v * bz + (1.0 - u - v) * cz
                 if u < 0.0 or v < 0.0 or u + v > 1.0 or z <= near[j, i]:
                     continue
-                for k in range(4):
-                    image[j, i, k] = colours[n, k] + (1.0 - colours[n, 3]) * image[j, i, k]
-                if colours[n, 3] == 1.0:
+                for k in range(image.shape[2]):
+                    image[j, i, k] = colours[n, k] + (1.0 - colours[n, -1]) * image[j, i, k]
+                if colours[n, -1] == 1.0:
                     near[j, i] = z

@@ -60,7 +60,7 @@ class Still:
         self.axes = axes_of(azimuth, elevation)
         self.eye, self.floor = np.asarray(target) - DISTANCE * length * self.axes[2], floor
         shape = (HEIGHT * FINE, WIDTH * FINE)
-        self.bodies, self.shadow = ((np.zeros((*shape, 4), "f4"), np.zeros(shape, "f4")) for _ in range(2))
+        self.bodies, self.shadow = ((np.zeros((*shape, k), "f4"), np.zeros(shape, "f4")) for k in (4, 1))
         self.words: list[Markup] = []
         self.taken: list[tuple[float, float, float, float]] = []
 
@@ -92,7 +92,7 @@ class Still:
         if alpha == 1.0 and self.floor is not None:
             fallen = corners - ((corners[..., 2] - self.floor) / LAMP[2])[..., None] * LAMP
             above = (corners[..., 2] > self.floor).all(axis=1)
-            paint(self.seen(fallen[above]), np.tile([0.0, 0.0, 0.0, 1.0], (int(above.sum()), 1)), *self.shadow)
+            paint(self.seen(fallen[above]), np.ones((int(above.sum()), 1)), *self.shadow)
         shades = alpha * np.column_stack([shades, np.ones(len(shades))])
         paint(self.seen(corners), shades, *self.bodies)
 
@@ -143,10 +143,12 @@ class Still:
 
     def picture(self) -> bytes:
         """The picture without its words, as a WebP file."""
-        parts: Reals = np.zeros((HEIGHT, WIDTH, 4))
+        parts: Reals = np.zeros((HEIGHT, WIDTH, 4), "f4")
         for i, j in np.ndindex(FINE, FINE):
             body, shadow = (layer[0][i::FINE, j::FINE] for layer in (self.bodies, self.shadow))
-            parts += (body + SHADOW * (1 - body[..., 3:]) * shadow) / FINE**2
+            parts += body
+            parts[..., 3:] += SHADOW * (1 - body[..., 3:]) * shadow
+        parts /= FINE**2
         parts[..., :3] /= np.maximum(parts[..., 3:], 1e-6)
         file = io.BytesIO()
         Image.fromarray(np.round(255 * np.clip(parts, 0, 1)).astype(np.uint8)).save(file, "webp", quality=QUALITY)
