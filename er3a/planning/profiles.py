@@ -181,6 +181,65 @@ def trapezoid(t: Reals, duration: float, ramp: float | Reals) -> Rates:
     return x, dx / duration, ddx / duration**2
 
 
+@dataclass(frozen=True)
+class MotionLaw:
+    """A trapezoidal speed profile.
+
+    Attributes
+    ----------
+    duration : s; ramp : share of it that each ramp takes, at most 1/2
+    """
+
+    duration: float
+    ramp: float
+
+    @property
+    def saved_by_blend(self) -> float:
+        """Time (s) saved by not stopping at one end."""
+        return self.duration * self.ramp / 2
+
+    def times(self, share: Reals) -> Reals:
+        """Times at which places of the way are passed.
+
+        Parameters
+        ----------
+        share : (k,), of the whole way, 0 to 1
+
+        Returns
+        -------
+        t : (k,), s after the start
+        """
+        share, ramp = np.asarray(share, float), self.ramp * self.duration
+        # On a ramp the share grows with the square of the time: share = top t^2 / (2 ramp).
+        top = 1 / (self.duration * (1 - self.ramp))
+        rise = top * ramp / 2
+        early, late = (
+            np.sqrt(2 * ramp * np.clip(share, 0, None) / top),
+            np.sqrt(2 * ramp * np.clip(1 - share, 0, None) / top),
+        )
+        even = ramp + (share - rise) / top
+        return np.where(share < rise, early, np.where(share > 1 - rise, self.duration - late, even))
+
+
+def law_of(way: float, speed: float, acceleration: float) -> MotionLaw:
+    """The trapezoidal profile over a length, from rest to rest.
+
+    Parameters
+    ----------
+    way : length, in any unit
+    speed, acceleration : in the same unit per s and per s^2
+
+    Returns
+    -------
+    law : the triangular profile, with half of the time for each ramp, if the way is too short to reach the speed
+    """
+    # Each ramp takes speed / acceleration; both together need a way of speed^2 / acceleration.
+    if way * acceleration >= speed * speed:
+        duration = way / speed + speed / acceleration
+        return MotionLaw(duration, speed / acceleration / duration)
+    return MotionLaw(2 * np.sqrt(way / acceleration), 0.5)
+
+
 class TimeLaw(Protocol):
     """Share of the path done (0..1) at times (...,) in s, with its first and second derivative by time;
     :class:`er3a.Er3aError` beyond start and end.

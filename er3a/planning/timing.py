@@ -25,10 +25,10 @@ import scipy
 from er3a.by_value import ByValue
 from er3a.errors import Er3aError
 from er3a.finding import Finding, fact
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.motion_faults import OVER, RateLimit
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
-from er3a.planning.profiles import Rates
+from er3a.planning.profiles import Rates, law_of, trapezoid
 from er3a.robots.robot import Robot
 
 LONGEST_STEP = 0.02  # share of the whole path between two nodes
@@ -36,7 +36,6 @@ SHARPEST_BEND = 0.15  # rad, between two steps in joint space measured in full s
 SHORTEST_STEP = 2e-4  # s at full speed; bends sharper than this count as corners
 SAME_NODE = 1e-5  # s at full speed
 MAX_ROUNDS = 30
-STRAIGHT_NODES = 81  # of a joint move, evenly along it
 SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 
@@ -220,10 +219,15 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
     """
     s = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0) / limits.speed).max(axis=1))])
     elapsed = 0.0 if programmed is None else float(programmed[-1] - programmed[0])
-    if (path := path_through(q, s)) is None:
+    kept = np.flatnonzero(np.concatenate([[True], np.diff(s) > SAME_NODE]))
+    if len(kept) < 2:
         return standing(q[-1], elapsed)
-    kept, s, spline = path
-    cap = None if programmed is None or len(kept) == 2 else np.gradient(s, programmed[kept])
+    kept[-1] = len(s) - 1  # the end stays the end
+    q, s = q[kept], s[kept]
+    if len(s) == 2:
+        return within_limits(straight(*q, limits).curve, limits, elapsed)
+    spline = scipy.interpolate.CubicSpline(s, q)
+    cap = None if programmed is None else np.gradient(s, programmed[kept])
     constraint = toppra_library().constraint
     speeds, accelerations = (np.stack([-most, most], axis=1) for most in (limits.speed, limits.acceleration))
     scheme = constraint.DiscretizationType.Interpolation  # at both ends of each step
@@ -234,29 +238,6 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
     ]
     speed, t = solved(toppra_path(s, spline), s, constraints)
     return within_limits(polynomial_motion(run_along(s, spline, speed, t), t, SPLINE_DEGREE), limits, elapsed)
-
-
-def path_through(q: Reals, s: Reals) -> tuple[Integers, Reals, scipy.interpolate.CubicSpline] | None:
-    """The cubic spline through nodes, without those of one place.
-
-    Parameters
-    ----------
-    q : (N, n), rad or m
-    s : (N,), path parameter, not falling
-
-    Returns
-    -------
-    kept : which nodes are left; s : (k,), their places, or more places on a path of two; spline
-        None in place of all if a single node is left
-    """
-    kept = np.flatnonzero(np.concatenate([[True], np.diff(s) > SAME_NODE]))
-    if len(kept) < 2:
-        return None
-    kept[-1] = len(s) - 1  # the end stays the end
-    q, s = q[kept], s[kept]
-    if len(s) == 2:
-        q, s = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, s[1], STRAIGHT_NODES)
-    return kept, s, scipy.interpolate.CubicSpline(s, q)
 
 
 def within_limits(curve: PiecewiseMotion, limits: JointLimits, smallest: float = 0.0) -> Timed:
@@ -305,7 +286,7 @@ def run_along(s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: 
 
 
 def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
-    """The fastest synchronised joint move between two joint vectors, from rest to rest.
+    """The fastest synchronised joint move between two joint vectors, from rest to rest, in closed form.
 
     Parameters
     ----------
@@ -314,14 +295,20 @@ def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
 
     Returns
     -------
-    motion : through ``STRAIGHT_NODES`` nodes
-
-    Raises
-    ------
-    TimingError
-        if there is no such time law
+    motion : all joints share one trapezoid, as steep and as high as the joint allows that has most to do
     """
-    return fastest(np.linspace(start, end, STRAIGHT_NODES), limits)
+    way = end - start
+    with np.errstate(divide="ignore"):  # a joint at rest sets no limit
+        speed, pull = (float((most / np.abs(way)).min()) for most in (limits.speed, limits.acceleration))
+    if np.isinf(speed):
+        return standing(end, 0.0)
+    law = law_of(1.0, speed, pull)
+
+    def rates(t: Reals) -> Rates:
+        share, slope, bend = (each[..., None] * way for each in trapezoid(t, law.duration, law.ramp))
+        return start + share, slope, bend
+
+    return Timed(polynomial_motion(rates, law.duration * np.array([0.0, law.ramp, 1 - law.ramp, 1.0]), 2))
 
 
 def standing(q: Reals, duration: float) -> Timed:

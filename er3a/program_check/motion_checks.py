@@ -28,7 +28,7 @@ from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Reals
 from er3a.planning import motion_faults
 from er3a.planning.piecewise import SAME_TIME, PiecewiseMotion, chebyshev_times, motion_through
-from er3a.planning.profiles import trapezoid
+from er3a.planning.profiles import MotionLaw, law_of, trapezoid
 from er3a.planning.timing import SPLINE_DEGREE, JointLimits, standing
 from er3a.program_check.program_check_findings import gravity, which
 from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate
@@ -46,54 +46,12 @@ SLIGHT_TURN = math.radians(1.0)  # of the tool on an arc, which way round does n
 SAME_ARRIVAL = 1e-4  # rad
 FAR_TURN, NEAR_MOVE = math.radians(90.0), 0.05  # of a joint that jumps: it turns so far where the tool moves less
 SPARED = math.radians(10.0)  # the other way round is named where it is shorter by so much
+ASSUMED_TOOL_SPEED, ASSUMED_TOOL_ACCELERATION = 0.25, 2.0  # m/s and m/s^2, where a program does not say
+ASSUMED_JOINT_SHARE = 0.1  # of the joints' maximum speed, where a program does not say
 MOST_JOINTS = 6  # of arms whose joints follow from the tool's path
 
 Poses = Callable[[Reals], Reals]
 """T_world_tool (k, 4, 4), m, at shares of the way (k,)."""
-
-
-@dataclass(frozen=True)
-class MotionLaw:
-    """A trapezoidal speed profile.
-
-    Attributes
-    ----------
-    duration : s; ramp : share of it that each ramp takes, at most 1/2
-    """
-
-    duration: float
-    ramp: float
-
-    @property
-    def saved_by_blend(self) -> float:
-        """Time (s) saved by not stopping at one end."""
-        return self.duration * self.ramp / 2
-
-    def times(self, share: Reals) -> Reals:
-        """Times at which places of the way are passed.
-
-        Parameters
-        ----------
-        share : (k,), of the whole way, 0 to 1
-
-        Returns
-        -------
-        t : (k,), s after the start
-        """
-        share, ramp = np.asarray(share, float), self.ramp * self.duration
-        # On a ramp the share grows with the square of the time: share = top t^2 / (2 ramp).
-        top = 1 / (self.duration * (1 - self.ramp))
-        rise = top * ramp / 2
-        early, late = (
-            np.sqrt(2 * ramp * np.clip(share, 0, None) / top),
-            np.sqrt(2 * ramp * np.clip(1 - share, 0, None) / top),
-        )
-        even = ramp + (share - rise) / top
-        return np.where(share < rise, early, np.where(share > 1 - rise, self.duration - late, even))
-
-
-ASSUMED_TOOL_SPEED, ASSUMED_TOOL_ACCELERATION = 0.25, 2.0  # m/s and m/s^2, where a program does not say
-ASSUMED_JOINT_SHARE = 0.1  # of the joints' maximum speed, where a program does not say
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,25 +124,6 @@ class MotionPath(ByValue):
         length : mm along the path of the tool point, rounded to 1 um
         """
         return round(1000 * self.length * share, 3)
-
-
-def law_of(way: float, speed: float, acceleration: float) -> MotionLaw:
-    """The trapezoidal profile over a length, from rest to rest.
-
-    Parameters
-    ----------
-    way : length, in any unit
-    speed, acceleration : in the same unit per s and per s^2
-
-    Returns
-    -------
-    law : the triangular profile, with half of the time for each ramp, if the way is too short to reach the speed
-    """
-    # Each ramp takes speed / acceleration; both together need a way of speed^2 / acceleration.
-    if way * acceleration >= speed * speed:
-        duration = way / speed + speed / acceleration
-        return MotionLaw(duration, speed / acceleration / duration)
-    return MotionLaw(2 * math.sqrt(way / acceleration), 0.5)
 
 
 def _given(rate: Rate | None, unit: str) -> float | None:

@@ -17,7 +17,7 @@ def test_a_single_joint_takes_the_time_of_the_trapezoid(angle):
     v, a = LIMITS.speed[0], LIMITS.acceleration[0]
     exact = 2 * np.sqrt(angle / a) if angle < v**2 / a else angle / v + v / a
     motion = straight(np.zeros(6), np.array([angle, 0, 0, 0, 0, 0]), LIMITS)
-    assert motion.duration == pytest.approx(exact, rel=2e-3)
+    assert motion.duration == pytest.approx(exact, rel=1e-12)
     np.testing.assert_allclose(motion.q[-1], [angle, 0, 0, 0, 0, 0], rtol=0, atol=1e-14)
 
 
