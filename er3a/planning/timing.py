@@ -36,6 +36,7 @@ SHARPEST_BEND = 0.15  # rad, between two steps in joint space measured in full s
 SHORTEST_STEP = 2e-4  # s at full speed; bends sharper than this count as corners
 SAME_NODE = 1e-5  # s at full speed
 MAX_ROUNDS = 30
+STRAIGHT_NODES = 81  # of a joint move, evenly along it
 SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 
@@ -295,7 +296,8 @@ def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
 
     Returns
     -------
-    motion : all joints share one trapezoid, as steep and as high as the joint allows that has most to do
+    motion : all joints share one trapezoid, as steep and as high as the joint allows that has most to do; through
+        ``STRAIGHT_NODES`` nodes, at which others look at it
     """
     way = end - start
     with np.errstate(divide="ignore"):  # a joint at rest sets no limit
@@ -308,7 +310,8 @@ def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
         share, slope, bend = (each[..., None] * way for each in trapezoid(t, law.duration, law.ramp))
         return start + share, slope, bend
 
-    return Timed(polynomial_motion(rates, law.duration * np.array([0.0, law.ramp, 1 - law.ramp, 1.0]), 2))
+    breaks = law.times(np.linspace(0.0, 1.0, STRAIGHT_NODES)), law.duration * np.array([law.ramp, 1 - law.ramp])
+    return Timed(polynomial_motion(rates, np.union1d(*breaks), 2))
 
 
 def standing(q: Reals, duration: float) -> Timed:
