@@ -30,8 +30,8 @@ from typing import Literal
 import numpy as np
 
 from er3a.dynamics.arm_model import PARAMETERS, ArmModel
-from er3a.dynamics.pose_bound import bounded_moment, max_over_poses
 from er3a.dynamics.torques import time_mean
+from er3a.dynamics.worst_poses import max_over_poses
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
@@ -294,7 +294,7 @@ WristQuantity = Literal["payload", "moment", "inertia"]
 class WristUse:
     """What a load requires, against what is allowed: kg, N m or kg m^2; ``joint`` from 1, None for the payload.
 
-    ``asked`` is in the worst pose found, ``most`` a bound that no pose exceeds, with the load's tolerances.
+    ``asked`` is in the worst pose found, ``most`` there with the load's tolerances.
     """
 
     quantity: WristQuantity
@@ -328,7 +328,7 @@ def levers(robot: Robot, q: Reals, point: Reals) -> Reals:
     return far
 
 
-def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> tuple[Reals, Reals]:
+def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> Reals:
     """Largest distances of a point of the flange from some rows' axes, over all poses within the limits.
 
     Parameters
@@ -338,7 +338,7 @@ def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> tuple[Reals
 
     Returns
     -------
-    found, bound : (r,), m, the largest found, and what no pose exceeds
+    found : (r,), m, the largest found
     """
     x, y, z = point.tolist()
     return worst_moments(robot, Load(1.0, (x, y, z)), 1.0, rows)
@@ -366,7 +366,7 @@ def load_moments(robot: Robot, load: Load, gravity: float, q: Reals) -> Reals:
     return found
 
 
-def worst_moments(robot: Robot, load: Load, gravity: float, rows: Sequence[int]) -> tuple[Reals, Reals]:
+def worst_moments(robot: Robot, load: Load, gravity: float, rows: Sequence[int]) -> Reals:
     """Largest moments of a load about some rows' axes, as :func:`load_moments`, over all poses within the limits.
 
     Parameters
@@ -377,11 +377,9 @@ def worst_moments(robot: Robot, load: Load, gravity: float, rows: Sequence[int])
 
     Returns
     -------
-    found, bound : (r,), N m, the largest found, and what no pose exceeds
+    found : (r,), N m, the largest found
     """
-    climbed = max_over_poses(robot, lambda q: load_moments(robot, load, gravity, q)[:, list(rows)])
-    found = [bounded_moment(robot, load, gravity, row, q) for row, q in zip(rows, climbed.q)]
-    return np.array([each.found for each in found]), np.array([each.bound for each in found])
+    return max_over_poses(robot, lambda q: load_moments(robot, load, gravity, q)[:, list(rows)]).values
 
 
 def wrist_use(
@@ -402,22 +400,21 @@ def wrist_use(
     """
     heaviest, ratio = load.mass + off[0], 1 + off[0] / load.mass if load.mass else 1.0
     joints = sorted({joint for joint, _ in (*wrist.moment, *wrist.inertia)})
-    far: dict[int, tuple[float, float]] = {}
+    far: dict[int, float] = {}
     if joints:  # a wrist of which the payload alone is known has none
-        found, bounds = worst_levers(robot, np.array(load.centre), [joint - 1 for joint in joints])
-        far = dict(zip(joints, zip(found.tolist(), (bounds + off[1]).tolist())))
+        far = dict(zip(joints, worst_levers(robot, np.array(load.centre), [joint - 1 for joint in joints]).tolist()))
     uses = [WristUse("payload", None, load.mass, heaviest, wrist.payload)] if np.isfinite(wrist.payload) else []
     pushed = any(load.force) or any(load.moment)
     for joint, allowed in wrist.moment:
-        lever, longest = far[joint]
-        asked, most = load.mass * gravity * lever, heaviest * gravity * longest
+        lever = far[joint]
+        asked, most = load.mass * gravity * lever, heaviest * gravity * (lever + off[1])
         if pushed:
-            (asked,), (bound,) = (each.tolist() for each in worst_moments(robot, load, gravity, [joint - 1]))
-            most += bound - load.mass * gravity * (longest - off[1])
+            pushing = float(worst_moments(robot, load, gravity, [joint - 1])[0]) - asked
+            asked, most = asked + pushing, most + pushing
         uses.append(WristUse("moment", joint, asked, most, allowed))
     for joint, allowed in wrist.inertia:
-        (lever, longest), own = far[joint], _own(robot, load, joint)
-        most = heaviest * longest**2 + ratio * own
+        lever, own = far[joint], _own(robot, load, joint)
+        most = heaviest * (lever + off[1]) ** 2 + ratio * own
         uses.append(WristUse("inertia", joint, load.mass * lever**2 + own, most, allowed))
     return tuple(uses)
 

@@ -12,11 +12,10 @@ import numpy as np
 import scipy
 
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of
-from er3a.dynamics.pose_bound import Bounded, Size, bounded_torque, max_over_poses
+from er3a.dynamics.worst_poses import Maxima, max_over_poses
 from er3a.errors import ShapeError
 from er3a.kinematics.forward import checked_joints
 from er3a.numerics.arrays import Reals
-from er3a.robots.joint_limits import within
 from er3a.robots.masses import Drives, Load
 from er3a.robots.robot import Robot
 
@@ -327,20 +326,8 @@ def power_imbalance(model: ArmModel, parts: TorqueParts, q: Reals, qd: Reals, qd
     return float(np.abs(change - power).max(initial=0.0) / scale)
 
 
-@dataclass(frozen=True, eq=False)
-class WorstHolding:
-    """Per joint the largest holding torque found (n,), with the sign that it has in its pose, a row of q (n, n).
-
-    ``bound`` (n,): the absolute value that no pose within the limits exceeds.
-    """
-
-    values: Reals
-    q: Reals
-    bound: Reals
-
-
-def worst_holding(model: ArmModel) -> WorstHolding:
-    """The largest holding torque of each joint by its absolute value, over all poses within the limits.
+def worst_holding(model: ArmModel) -> Maxima:
+    """The largest holding torque of each joint that a search over all poses within the limits finds.
 
     Parameters
     ----------
@@ -348,28 +335,7 @@ def worst_holding(model: ArmModel) -> WorstHolding:
 
     Returns
     -------
-    worst : N m or N, with the poses and bounds that no pose exceeds
+    worst : N m or N, each with the sign that it has in its pose
     """
-
-    def size(q: Reals) -> Reals:
-        return np.abs(holding_torques(model, q))
-
-    def bounded(joint: int) -> Bounded:
-        def own(q: Reals) -> Reals:
-            return size(q)[:, joint]
-
-        return bounded_torque(model, joint, own, _polished(model.robot, own, climbed.q[joint]))
-
-    climbed = max_over_poses(model.robot, size)
-    found = [bounded(joint) for joint in range(model.robot.joints)]
-    q = np.array([each.q for each in found])
-    return WorstHolding(np.diagonal(holding_torques(model, q)).copy(), q, np.array([each.bound for each in found]))
-
-
-def _polished(robot: Robot, size: Size, q: Reals) -> Bounded:
-    """The top near a pose (n,) that was climbed to one joint at a time: all joints together, within the limits."""
-    start, ends = float(size(q[None])[0]), list(zip(robot.lower, robot.upper))
-    top = scipy.optimize.minimize(lambda x: -size(x[None])[0], q, bounds=ends, method="L-BFGS-B")
-    if -top.fun > start and within(robot, top.x):
-        return Bounded(float(-top.fun), top.x, np.inf)
-    return Bounded(start, q, np.inf)
+    found = max_over_poses(model.robot, lambda q: np.abs(holding_torques(model, q)))
+    return Maxima(np.diagonal(holding_torques(model, found.q)).copy(), found.q)

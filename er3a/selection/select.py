@@ -37,7 +37,8 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import comparable, joint_columns, limit_margin, shown, unit_compared
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import nearest, why_none
-from er3a.selection.rule_names import RuleName
+
+RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
 
 
 @dataclass(frozen=True)
@@ -152,20 +153,6 @@ RULES: dict[RuleName, Rule] = {
     "limits": Rule(None, "greatest", _limit_distance),
     "clearance": Rule("mm", "greatest", _clearance),
 }
-
-
-def available_rules(robot: Robot) -> tuple[RuleName, ...]:
-    """Names of the rules whose data the robot has.
-
-    Parameters
-    ----------
-    robot : only "time" needs data, the speed of each joint
-
-    Returns
-    -------
-    names : keys of ``RULES``, in their order
-    """
-    return tuple(name for name in RULES if name != "time" or np.isfinite(robot.speed).all())
 
 
 def mixed_cost(weights: Mapping[RuleName, float], costs: Mapping[RuleName, Reals], allowed: Flags) -> Reals:

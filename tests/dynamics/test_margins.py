@@ -9,7 +9,6 @@ import pytest
 import scipy
 
 import er3a
-from er3a.dynamics import pose_bound
 from er3a.dynamics.arm_model import arm_model
 from er3a.dynamics.margins import (
     DriveLimits,
@@ -177,8 +176,6 @@ def test_the_worst_holding_pose_of_two_links_is_stretched_out():
     found = worst_holding(arm_model(arm))
     expected = np.array([g * (3 * 0.2 + 2 * (a + 0.3)), g * 2 * 0.3])
     np.testing.assert_allclose(np.abs(found.values), expected, rtol=1e-5)
-    assert (found.bound >= expected * (1 - 1e-9)).all()
-    assert (found.bound <= expected * 1.0011).all()
     # Limits that keep the arm away from there: the greatest by a fine grid of the law of levers.
     kept = arm.replace(lower=[0.9, 0.4], upper=[1.4, 2.5])
     x, y = np.meshgrid(np.linspace(0.9, 1.4, 501), np.linspace(0.4, 2.5, 2101))
@@ -186,8 +183,6 @@ def test_the_worst_holding_pose_of_two_links_is_stretched_out():
     second = np.abs(g * 2 * 0.3 * np.cos(x + y)).max()
     found = worst_holding(arm_model(kept))
     np.testing.assert_allclose(np.abs(found.values), [first, second], rtol=1e-5)
-    assert (found.bound >= [first, second]).all()
-    assert (found.bound <= np.array([first, second]) * 1.0012).all()
 
 
 KINDS = ("sliding", "coupled", "sum")
@@ -198,7 +193,7 @@ WALL = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
 @pytest.mark.parametrize(
     "kind", ["floor", *(pytest.param(each, marks=pytest.mark.long) for each in ("wall", "pushed", "seven")), *KINDS]
 )
-def test_no_pose_needs_more_holding_torque_than_the_bound(arm, kind):
+def test_no_pose_tried_needs_more_holding_torque_than_found(arm, kind):
     """Of poses drawn at random, each then climbed joint by joint by differences of the torque alone."""
     load = Load(1.5, (0.03, -0.02, 0.09), (0.002, 0.002, 0.001, 0.0, 0.0, 0.0))
     if kind == "wall":
@@ -222,28 +217,15 @@ def test_no_pose_needs_more_holding_torque_than_the_bound(arm, kind):
     q = q[within(arm, q)]
     assert (np.abs(er3a.gravity(arm, q, load)).max(axis=0) <= np.abs(found.values) * (1 + 1e-6) + 1e-9).all()
     assert within(arm, found.q).all()
-    assert (found.bound >= np.abs(found.values)).all()
-    assert (found.bound <= np.abs(found.values) * (1.03 if kind in ("coupled", "seven", "sum") else 1.002) + 1e-9).all()
 
 
-def test_of_an_arm_that_hardly_moves_the_bound_is_what_it_holds(arm):
+def test_an_arm_that_hardly_moves_holds_what_it_holds_there(arm):
     """Weight and a push at the tool, together and against each other."""
     load = Load(1.5, (0.03, -0.02, 0.09), force=(40.0, -20.0, 90.0), moment=(3.0, -1.0, 2.0))
     for q in np.random.default_rng(7).uniform(arm.lower, arm.upper, (1, 6)):
         held = np.abs(er3a.gravity(arm, q, load))
         found = worst_holding(arm_model(arm.replace(lower=q - 1e-6, upper=q + 1e-6), load))
-        np.testing.assert_allclose(found.bound, held, rtol=2e-3, atol=1e-3)
-
-
-@pytest.mark.long
-def test_a_bound_that_the_budget_cuts_short_still_holds(arm, monkeypatch):
-    whole = worst_holding(arm_model(arm)).bound
-    monkeypatch.setattr(pose_bound, "MAX_CORNERS", 1)
-    cut = worst_holding(arm_model(arm.replace(name="cut")))
-    assert (cut.bound >= np.abs(cut.values)).all()
-    assert (cut.bound[1:] > whole[1:]).any()
-    # Joint 1's axis is vertical: nothing to hold, and the bound says so.
-    assert cut.bound[0] < 1e-9
+        np.testing.assert_allclose(np.abs(found.values), held, rtol=2e-3, atol=1e-3)
 
 
 def test_the_worked_example_of_a_manual():
@@ -261,7 +243,7 @@ def test_the_worked_example_of_a_manual():
     assert (payload.asked, payload.most) == (3.0, 3.1)
     for use in uses:
         most = {"moment": 3.1 * 9.8 * 0.225, "inertia": 3.1 * 0.225**2}[use.quantity]
-        assert most * (1 - 1e-9) <= use.most < most * 1.01
+        assert use.most == pytest.approx(most, rel=1e-6)
 
 
 @pytest.mark.long
@@ -280,7 +262,7 @@ def test_forces_on_the_tool_count_to_the_wrists_moments(arm):
         held = np.abs(er3a.gravity(mounted, q, load) - er3a.gravity(mounted, q)).max(axis=0)
         assert all(held[joint - 1] <= use.asked * (1 + 1e-6) for joint, use in uses.items())
     for use in uses.values():
-        assert use.asked <= use.most <= use.asked * (1 + 1.1e-5)
+        assert use.most == pytest.approx(use.asked, rel=1e-12)
     off = {use.joint: use.most for use in wrist_use(arm, wrist, load, off=(0.1, 0.005))}
     assert off[5] == pytest.approx(100 * 0.1985 + 1.1 * 9.81 * 0.1135, rel=1e-4)
 
@@ -288,11 +270,9 @@ def test_forces_on_the_tool_count_to_the_wrists_moments(arm):
 @pytest.mark.long
 def test_levers_are_distances_of_the_load_from_the_axes(arm):
     point, q = np.array([0.03, -0.02, 0.1]), np.random.default_rng(2).uniform(arm.lower, arm.upper, (3000, 6))
-    far, bounds = worst_levers(arm, point, range(2, 6))
+    far = worst_levers(arm, point, range(2, 6))
     seen = levers(arm, q, point)
     assert (seen[:, 2:] <= far + 1e-9).all()
-    assert (far <= bounds).all()
-    assert (bounds <= far * (1 + 1.1e-5)).all()
     # Of a wrist whose axes meet: the distance from their point for joints 4 and 5, that from its own axis for 6.
     whole = np.hypot(np.hypot(0.03, 0.02), 0.1 + 0.0785)
     np.testing.assert_allclose(far[1:], [whole, whole, np.hypot(0.03, 0.02)], atol=1e-6)
@@ -315,7 +295,7 @@ def test_demands_of_a_drive_in_closed_form():
 
 @pytest.mark.long
 @pytest.mark.parametrize("joint", [1, 2, 4])
-def test_the_bound_of_a_wall_mounted_arm_against_potential_energies_alone(arm, joint):
+def test_the_worst_pose_of_a_wall_mounted_arm_against_potential_energies_alone(arm, joint):
     """The torque as a derivative of potential energy by complex steps, climbed by SciPy: nothing of the library."""
     mounted = arm.replace(base=WALL)
     bodies = {each.link: each.body for each in arm.masses.links if each.link}
@@ -330,5 +310,4 @@ def test_the_bound_of_a_wall_mounted_arm_against_potential_energies_alone(arm, j
     ends = list(zip(arm.lower, arm.upper))
     tops = [scipy.optimize.minimize(lambda q: -torque(q), q, bounds=ends, method="L-BFGS-B").fun for q in best]
     found = worst_holding(arm_model(mounted))
-    assert -min(tops) <= found.bound[joint]
     assert -min(tops) == pytest.approx(abs(found.values[joint]), rel=1e-3)

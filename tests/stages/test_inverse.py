@@ -17,7 +17,6 @@ from scipy.spatial.transform import Rotation
 
 import er3a.pipeline.messages.inverse  # noqa: F401
 from er3a.collision.along import clearance
-from er3a.collision.pairs import label_of
 from er3a.errors import InputError, ResultError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
@@ -36,8 +35,6 @@ from er3a.pipeline.stages.inverse.model import (
     shown_targets,
 )
 from er3a.pipeline.study import Study
-from er3a.robots.joint_limits import meant
-from er3a.selection.select import RULES
 from testing.on_demand import OnDemand
 
 ROOT = Path(__file__).parents[2]
@@ -229,21 +226,6 @@ def test_a_singular_pose_is_taken_only_where_no_other_is(computed):
         assert ("wrist_aligned" in finding.singular) == singular[0]
 
 
-def test_each_branch_has_what_its_clearance_is_of(computed):
-    name, results = computed
-    ranked, robot = results.rankings.take(results.rankings.rule == "clearance"), load_robot(name)
-    assert len(ranked) or name == "er3a_c60_article"
-    for k in range(len(ranked)):
-        own = results.solutions.take(
-            (results.solutions.target == ranked.target[k]) & (results.solutions.branch == ranked.branch[k])
-        )
-        q = meant(robot, own.q_deg[own.first_of_branch & own.within_limits])
-        found = clearance(robot, q, None)
-        assert ranked.measure[k] == pytest.approx(1000 * found.distance[0])
-        assert ranked.between[k] == label_of(found.pair[0])
-    assert set(results.rankings.between[results.rankings.rule != "clearance"]) == {""}
-
-
 def test_round_trips_lose_nothing(computed):
     trips = computed[1].summary.round_trips
     assert trips.own_found == trips.poses == sum(trips.counts_within_limits) == 2000
@@ -308,29 +290,11 @@ def test_colliding_solutions_are_named_and_not_chosen(tmp_path):
         assert f"and {name} overlap by" in page
         if name == "ceiling":
             assert "elbow_down" in rows.label[rows.rank == 1].item()
-            ranked = results.rankings
-            assert set(ranked.branch[ranked.place == 0]) == set(rows.branch[hit])
         else:
             assert target.chosen_deg is None
             assert (target.reason.code, target.reason.count) == ("all_collide", hit.sum())
             assert (target.obstacle.code, target.obstacle.count) == ("branches_collide", target.within_limits)
             run.show("record", "inverse", study, "er3_600", folder, tmp_path / "floor.rrd")
-
-
-def test_each_rule_ranks_the_branches(computed):
-    results = computed[1]
-    for target in results.summary.targets:
-        rows = results.rankings.take(results.rankings.target == target.name)
-        assert len(set(rows.branch)) == target.within_limits
-        for rule in set(rows.rule):
-            group = rows.take(rows.rule == rule)
-            assert group.place.min() == 1
-            greatest = rule in RULES and RULES[rule].best == "greatest"
-            best = group.measure.max() if greatest else group.measure.min()
-            assert group.measure[group.place == 1] == pytest.approx(best, abs=1e-8)
-        if target.chosen_deg is not None and target.reason.code != "nearest_regular":
-            chosen = results.solutions.branch[(results.solutions.target == target.name) & (results.solutions.rank == 1)]
-            assert chosen.item() in rows.branch[(rows.rule == "nearest") & (rows.place == 1)]
 
 
 @pytest.mark.long

@@ -71,7 +71,6 @@ RULE_NAMES = words(
         "manipulability": "manipulability",
         "limits": "limits",
         "clearance": "clearance",
-        "mix": "mix",
     }
 )
 

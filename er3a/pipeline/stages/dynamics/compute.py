@@ -58,8 +58,8 @@ def drive_uses(
     for held in holding:
         rated = float(drives.rated[held.joint - 1])
         if np.isfinite(rated):
-            upper = held.bound + held.tolerance
-            found.append(model.Use("holding", held.joint, None, abs(held.torque), upper, rated, held.unit))
+            asked = abs(held.torque)
+            found.append(model.Use("holding", held.joint, None, asked, asked + held.tolerance, rated, held.unit))
     return tuple(found)
 
 
@@ -588,7 +588,6 @@ def _holding(arm: LoadedArm) -> tuple[model.HoldingTorque, ...]:
         model.HoldingTorque(
             joint=j + 1,
             torque=float(found.values[j]),
-            bound=float(found.bound[j]),
             tolerance=float(tolerance[j]),
             unit=model.FORCE if slides[j] else model.TORQUE,
             q=tuple(q[j].tolist()),

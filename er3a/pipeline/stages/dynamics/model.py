@@ -102,14 +102,10 @@ class MassesUsed:
 
 @dataclass(frozen=True)
 class HoldingTorque:
-    """The maximum torque found that a joint holds at rest within the limits, and the pose where it does.
-
-    ``bound``: the absolute value that none of the poses within the limits exceeds, for the masses as given.
-    """
+    """The maximum torque found that a joint holds at rest within the limits, and the pose where it does."""
 
     joint: int
     torque: float
-    bound: float
     tolerance: float
     unit: Unit
     q: tuple[float, ...]
@@ -139,13 +135,13 @@ def hardest_held(holding: tuple[HoldingTorque, ...]) -> HoldingTorque:
 
     Parameters
     ----------
-    holding : at least one; by its upper bound
+    holding : at least one
 
     Returns
     -------
     held : one that turns if any has something to hold, because N and N m don't compare
     """
-    return max(holding, key=lambda held: (held.unit == TORQUE and held.bound > NOTHING_HELD, held.bound))
+    return max(holding, key=lambda held: (held.unit == TORQUE and abs(held.torque) > NOTHING_HELD, abs(held.torque)))
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from sys import intern
 
 import numpy as np
 import scipy
 
 from er3a.collision.along import bodies_of
-from er3a.collision.pairs import label_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
@@ -46,8 +44,7 @@ from er3a.robots.joint_limits import limit_margin, meant, shown, unit_compared
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import Choice
 from er3a.selection.regular_first import regular_first, singular
-from er3a.selection.rule_names import RuleName
-from er3a.selection.select import RULES, available_rules, mixed_cost, refusals
+from er3a.selection.select import refusals
 
 LITTLE_MARGIN_DEG = 2.0  # mm of a prismatic joint; as much as grasps and boxes are asked for by default
 
@@ -240,62 +237,6 @@ def _what_to_know(robot: Robot, rows: model.SolutionRows, chosen: int) -> tuple[
     return (*found, near) if margin < LITTLE_MARGIN_DEG else tuple(found)
 
 
-MIX = "mix"
-SAME_COST = 1e-9
-
-
-def rankings(
-    robot: Robot, target: Target, solved: SolvedTarget, scene: Scene | None, mix: Mapping[RuleName, float]
-) -> model.RankingRows:
-    """Place and measure of each branch's best solution within the limits, by each rule.
-
-    Parameters
-    ----------
-    solved : the solutions of this target
-    mix : weights of the rules that make one more
-
-    Returns
-    -------
-    rows : one for each branch and rule, in the rule's unit; solutions that collide have place 0
-    """
-    rows = np.flatnonzero(solved.rows.first_of_branch & solved.rows.within_limits)
-    few = solved.solutions.take(rows)
-    free = ~collides(solved.rows)[rows]
-    bodies = bodies_of(robot, scene)
-    nearest = [intern(label_of(bodies.pairs[k])) if k >= 0 else "" for k in bodies.min_distance(few.q)[1]]
-    return model.RankingRows.stacked(
-        model.RankingRows.of(
-            few,
-            target=target.name,
-            rule=rule,
-            measure=measure,
-            place=_places(cost, free),
-            between=nearest if rule == "clearance" else "",
-        )
-        for rule, measure, cost in _measured(robot, few.q, target.q_ref, scene, mix, free)
-    )
-
-
-def _measured(
-    robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None, mix: Mapping[RuleName, float], free: Flags
-) -> Iterator[tuple[str, Reals, Reals]]:
-    """Name, measure and cost (n,) of each rule, and of the mix of those that the robot has data for."""
-    costs = {}
-    for rule in available_rules(robot):
-        measure = RULES[rule].measure(robot, q, q_ref, scene)
-        costs[rule] = RULES[rule].cost(measure)
-        yield rule, measure, costs[rule]
-    usable = {rule: weight for rule, weight in mix.items() if rule in costs}
-    if usable and free.any():
-        cost = mixed_cost(usable, costs, free)
-        yield MIX, cost, cost
-
-
-def _places(cost: Reals, free: Flags) -> Integers:
-    better = (cost[free] < cost[:, None] - SAME_COST).sum(axis=1)
-    return np.where(free, better + 1, 0)
-
-
 STAGE_NAME = "inverse"
 REPRODUCED_M = 1e-9  # by which a solution may miss its target: far above the rounding of a solution in closed form
 REPRODUCED_RAD = 1e-9
@@ -328,7 +269,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     assumed = shapes_assumed(robot, margin, {})
     clearance = margin if assumed else motion.penetration_tolerance_mm / 1000
     many, advised, stacks, solved = len(targets) > MANY_TARGETS, 0, 0, list[model.TargetResult]()
-    rows, ranked = list[model.SolutionRows](), list[model.RankingRows]()
+    rows = list[model.SolutionRows]()
     with shown_work(f"{name}: solving {len(targets)} targets"):
         for target in targets:
             advise = not many or advised < MAX_ADVISED
@@ -337,16 +278,11 @@ def compute(study: Study, name: str) -> model.InverseResults:
             solved.append(one.result)
             if len(one.rows):
                 rows.append(one.rows)
-                ranked.append(rankings(robot, target, one, scene, settings.mix))
             if len(rows) - stacks == STACKED:  # thousands of tables of few rows would fill the memory
-                rows[stacks:], ranked[stacks:] = (
-                    [model.SolutionRows.stacked(rows[stacks:])],
-                    [model.RankingRows.stacked(ranked[stacks:])],
-                )
+                rows[stacks:] = [model.SolutionRows.stacked(rows[stacks:])]
                 stacks += 1
-    solutions, ranks = model.SolutionRows.stacked(rows).of_joints(robot.slides), model.RankingRows.stacked(ranked)
+    solutions = model.SolutionRows.stacked(rows).of_joints(robot.slides)
     rows.clear()
-    ranked.clear()
     results = _with_clearance(robot, scene, solved)
     asked = [each for each in results if each.chosen_deg is not None and each.expect in (None, "reached")]
     chosen = meant(robot, np.reshape([each.chosen_deg for each in asked], (-1, robot.joints)))
@@ -362,7 +298,6 @@ def compute(study: Study, name: str) -> model.InverseResults:
     summary = model.InverseSummary(
         verdict=_verdict(results, worst, trips, bool(scene and scene.solids)).with_assumed_shapes(rests_on),
         figures=_figures(results, worst, trips),
-        mix=settings.mix,
         scene=scene.title if scene else None,
         turns=not many,
         targets=tuple(model.shown_targets(results)) if many else results,
@@ -378,7 +313,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
         ),
         assumed=(*_assumed(results), *assumed_tool(robot), *covered.assumed),
     )
-    return model.InverseResults(summary, _target_rows(results), solutions, ranks)
+    return model.InverseResults(summary, _target_rows(results), solutions)
 
 
 def _target_rows(targets: Sequence[model.TargetResult]) -> model.TargetRows:

@@ -12,19 +12,16 @@ from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles
-from er3a.selection.rule_names import RuleName
 
 
 class InverseSettings(StrictModel):
     """``round_trips``: random poses solved back.
 
-    ``scene`` holds the obstacles that clearance is measured from and that solutions may not touch; ``mix`` weighs
-    rules against each other as one more rule (names: er3a/selection/select.py).
+    ``scene`` holds the obstacles that clearance is measured from and that solutions may not touch.
     """
 
     round_trips: Annotated[int, Field(ge=1, le=10_000_000)] = 2000
     scene: Text | None = None
-    mix: Annotated[dict[RuleName, Annotated[float, Field(ge=0, le=1000)]], Field(min_length=1)] = {"nearest": 1}
 
 
 def _inputs(study: StudyFiles, robot: str) -> list[Path]:

@@ -15,7 +15,6 @@ from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.selection.nearest import WhyFirst
 from er3a.selection.regular_first import SINGULAR_PARTS
-from er3a.selection.rule_names import RuleName
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,6 @@ class InverseSummary(Summary):
 
     Attributes
     ----------
-    mix : weights of rules that make one more rule
     scene : title of the scene whose solids are not to be touched
     turns : whether the solutions stand in all turns; else (many targets) in the one nearest to the reference
     targets : of many only those that a page shows; all stand in the table of targets
@@ -106,7 +104,6 @@ class InverseSummary(Summary):
 
     needs = ("reach", "limits", "self_collision", "scene_collision")
 
-    mix: dict[RuleName, float]
     scene: str | None
     turns: bool
     targets: tuple[TargetResult, ...]
@@ -161,25 +158,12 @@ class TargetRows(Table):
         return ~self.reached & (self.outcome == self.expect)
 
 
-class RankingRows(Table):
-    """Place and measure, by each rule, of each branch's best solution within the limits."""
-
-    target: Texts = column("name of the target")
-    branch: Integers = column("number of the branch")
-    label: Texts = column("code of the branch")
-    rule: Texts = column("name of the rule, or mix")
-    measure: Reals = column("in the rule's unit; for the mix its cost, 0 the best")
-    place: Integers = column("1 is the best; 0 for solutions that collide")
-    between: Texts = column("of the rule clearance, what is nearest to what")
-
-
 class InverseResults(Results):
     """The stage's results."""
 
     summary: InverseSummary
     targets: TargetRows
     solutions: SolutionRows
-    rankings: RankingRows
 
 
 RESULTS = InverseResults

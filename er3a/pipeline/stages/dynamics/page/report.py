@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from er3a.pipeline.language import own_title, tr, with_unit, words
 from er3a.pipeline.messages.dynamics import BINDING, payload_key, payload_text, use_text
-from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of_column, fixed, number
+from er3a.pipeline.messages.numbers import at_least, decimals_of_column, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, word
 from er3a.pipeline.player.motions import at_rest
 from er3a.pipeline.player.player import drawing_head, player
@@ -283,12 +283,11 @@ def _bound(bound: model.BindingLimit | None) -> str:
 
 
 def _held(holding: Sequence[model.HoldingTorque]) -> list[list[str]]:
-    decimals = decimals_of_column(held.bound for held in holding)
+    decimals = decimals_of_column(abs(held.torque) for held in holding)
     return [
         [
             _label(held.joint, held.unit),
             fixed(abs(held.torque), decimals),
-            at_most(held.bound, decimals),
             fixed(held.tolerance, decimals),
             panel_link(held.q, ", ".join(fixed(value, 0) for value in held.q)),
         ]
