@@ -68,7 +68,7 @@ def inverse(
     q_ref : (n,), rad or m, reference for the choice of members of self-motions and of whole turns: in each branch the
         nearest turn comes first. None means zeros.
     redundancy : (k,), values of the redundancy parameters (``parameters_of``): an arm angle in rad, or a joint's value;
-        None means those of ``q_ref``; where a pose has no rows, the nearest value at which it has some is taken
+        None means those of ``q_ref``, or the nearest at which the pose has rows
     self_motion_rows : for an arm with one redundancy parameter, add for each self-motion the member nearest to
         ``q_ref`` and the one with the largest limit margin as rows; done too where no value tried has rows inside
 
@@ -235,7 +235,8 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
         return _by_iteration(robot, T, q_ref)
     values = by_class.checked_parameters(robot, redundancy, q_ref[None], 1)
     found = by_class.slots_of_class(robot, T[None], q_ref[None], values)
-    if len(solver.parameters) == 1 and not np.isfinite(found.q).any():
+    free = len(solver.parameters) == 1 and redundancy is None
+    if free and not np.isfinite(found.q).any():
         values = by_class.nearest_value(robot, T, q_ref, values)
         found = by_class.slots_of_class(robot, T[None], q_ref[None], values)
     slots, motions = found.q[0], found.settled[0].motions if found.settled else ()
@@ -243,7 +244,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
     traced: Sequence[SelfMotionCurve] = motions
     if len(solver.parameters) == 1:
         traced = by_class.LazySelfMotions(robot, T, q_ref, values)
-        motions = tuple(traced) if self_motion_rows or not filled.size else ()
+        motions = tuple(traced) if self_motion_rows or (free and not filled.size) else ()
     if solver.parameters:  # keep one where two branches meet; other arms' poses of that kind are settled
         filled = filled[by_class.distinct(robot, slots[filled], SAME_JOINTS)]
     rows, of = equivalents_within(robot, slots[filled], q_ref)

@@ -155,6 +155,7 @@ def test_a_pose_without_rows_at_the_held_joint_has_those_nearest_to_it(random):
         if at_zero or not rows.within_limits.any():
             continue
         seen += 1
+        assert not len(inverse(robot, T, redundancy=np.zeros(1)).q)  # what is asked for is not changed
         found = inverse(robot, T)
         nearest = np.abs(grid[rows.within_limits.any(axis=1)]).min()
         assert np.abs(forward(robot, found.q) - T).max() < 1e-9
