@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-ROWS_AT_ONCE = 1 << 17  # all texts of a million rows would take a hundred MB
+ROWS_AT_ONCE = 1 << 15  # all texts of a million rows would take a hundred MB
 
 
 class Kept(Protocol):
