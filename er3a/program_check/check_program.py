@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from itertools import chain
 from pathlib import Path
 from typing import Literal
@@ -52,7 +53,7 @@ from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
 from er3a.programs.execution import Execution, RunLimits, Step
 from er3a.programs.instructions import Load, Pause, Place, PoseTarget, Unknown
 from er3a.programs.languages import execute, read_program
-from er3a.programs.syntax import Program
+from er3a.programs.syntax import Assign, Program, Variable
 from er3a.robots.robot import Robot
 
 ASSUMED_SPEED = np.radians(180.0)  # rad/s
@@ -287,11 +288,18 @@ def _located(
     top = Place(program.file)
     found = [LocatedFinding(level_of(each), each, top) for each in program.findings]
     named = {step.instruction.text for step in steps if isinstance(step.instruction, Unknown)}
+    assigned = (each.target for each in chain(program.data, program.operations()) if isinstance(each, Assign))
+    given = {target.name for target in assigned if isinstance(target, Variable)}
     for number, motion in motions.items():
         step = steps[number]
         for finding, moment in motion.findings.items():
             # What follows from an instruction that is named at its own line is no second question.
             known = is_one(finding, "not_followed") and finding.text in named
+            if is_one(finding, "not_followed") and finding.reason == "undefined":
+                others = {
+                    name for name in given if _letters(name) != _letters(finding.text)
+                }  # p10 is not p11 misspelled
+                finding = finding.but(near=get_close_matches(finding.text, sorted(others), 1, NEAR_NAME))
             level: Level = "note" if known else level_of(finding, motion.guessed)
             found.append(LocatedFinding(level, finding, step.place, step.calls, 1, number, moment))
     found += [
@@ -309,6 +317,10 @@ def _located(
     grouped = [_at_worst(same) for same in groups.values()]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
     return tuple(sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -RANKS[each.level])))
+
+
+def _letters(name: str) -> str:
+    return name.strip("0123456789")
 
 
 def _not_understood(steps: Iterable[Step]) -> Iterator[tuple[Step, Finding]]:
@@ -335,6 +347,7 @@ def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
     return replace(first, finding=found, times=len(same))
 
 
+NEAR_NAME = 0.75  # of the letters of both names, in order: what may be misspelled
 NOT_FOLLOWED = ("not_followed", "way_not_known", "configuration_guessed")
 
 

@@ -215,6 +215,14 @@ def test_a_program_that_is_mended_as_advised_passes(tmp_path, code):
             assert after.level in ("pass", "note"), keys(after)
 
 
+@pytest.mark.parametrize(("name", "near"), [("XTEHRE", ("XTHERE",)), ("XTHERE2", ()), ("XELSEWHERE", ())])
+def test_a_name_that_the_program_nearly_gives_is_named(tmp_path, name, near):
+    (tmp_path / "a.src").write_text(krl("DECL E6POS XTHERE", "XTHERE={X 500,Y 0,Z 500}", f"PTP {name}"))
+    check = check_program(read_program(tmp_path / "a.src"), ROBOT, CheckOptions(start=HOME))
+    (found,) = (each.finding for each in check.findings if is_one(each.finding, "not_followed"))
+    assert found.near == near
+
+
 def test_each_reason_why_something_is_not_followed_that_has_a_remedy_is_mended():
     asked = {f"not_followed.{reason}" for reason in NOT_FOLLOWED} - {"not_followed.too_far"}
     assert asked <= MENDED.keys()

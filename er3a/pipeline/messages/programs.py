@@ -169,6 +169,7 @@ TEXTS = texts(
         "remedy.links": (
             "Keep these links apart: give the target another place, orientation or configuration, or add a via point."
         ),
+        "remedy.misspelled": "Misspelled? The program gives {near:, }. Else give its value by --assume NAME=VALUE.",
         "remedy.slower": "Lower this line's speed to {percent:g} % or less, its acceleration to {acceleration:g} %.",
         "programs.waits": "waits for signals: {count}",
     }
@@ -219,6 +220,8 @@ def remedy(finding: Finding) -> str:
 
 @advises("not_followed")
 def _(found: Finding) -> str:
+    if near := getattr(found, "near", ()):
+        return sentence("remedy.misspelled", near=near)
     return word("remedy", NOT_FOLLOWED, found.reason) if found.reason in NOT_FOLLOWED else tr(OTHERWISE)
 
 
