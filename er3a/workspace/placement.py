@@ -565,33 +565,6 @@ class BoxPlacement:
     places: Places
     chosen: list[int]
 
-    def room(self, row: int) -> Reals:
-        """How far the box can be moved from a place along x, y and z.
-
-        Parameters
-        ----------
-        row : number of the place
-
-        Returns
-        -------
-        room : (3, 2), m, down and up along each axis
-
-        Notes
-        -----
-        In steps of the lattice, through places of the same turn: a box between two of them lies in both together.
-        """
-        places = self.places
-        same = places.turned == places.turned[row]
-        steps = np.round((places.centre[same] - places.centre[row]) / self.field.spacing).astype(int)
-        there = {tuple(step) for step in steps.tolist()}
-        count = np.zeros((3, 2))
-        for axis, way in np.ndindex(3, 2):
-            step = np.zeros(3, dtype=int)
-            step[axis] = 2 * way - 1
-            while tuple((int(count[axis, way] + 1) * step).tolist()) in there:
-                count[axis, way] += 1
-        return count * self.field.spacing[:, None]
-
     @property
     def best_turns(self) -> Places:
         """The better of both turns at each centre."""

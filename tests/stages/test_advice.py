@@ -12,7 +12,6 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Plane, Scene
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import rpy_of, transform
-from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Target
@@ -21,9 +20,6 @@ from er3a.pipeline.stages.inverse.compute import LITTLE_MARGIN_DEG, solve_target
 from er3a.pipeline.stages.inverse.model import TargetResult
 from er3a.robots.joint_limits import limit_margin
 from er3a.workspace.causes import cause_of, relaxations
-from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
-from er3a.workspace.orientations import asked_of
-from er3a.workspace.placement import Task, find_places, narrowed
 from er3a.workspace.proven import EMPTY, cavities, prove_robot
 
 pytestmark = pytest.mark.long
@@ -114,28 +110,3 @@ def test_a_void_disappears_when_a_limit_is_extended_as_the_page_says():
             assert np.average(empty, weights=void.volumes * void.empty) < 0.02, cause
             carried_out += 1
     assert carried_out == 3
-
-
-def test_a_box_that_is_moved_as_far_as_is_said_stays_clear_of_the_scene():
-    """Beside a wall, at the end of its room each way: an arm with the margin, by distances in full, at all asked."""
-    robot, down, margin = load_robot("er3_600"), np.array([0.0, 0.0, -1.0]), 0.02
-    task = Task(np.array([0.2, 0.15, 0.05]), down, np.radians(20), 0.0, 0.15, np.radians(2))
-    wall = Scene("wall", (Plane("wall", np.array([-1.0, 0.0, 0.0]), -0.4),))
-    roll, held, bodies = roll_of(robot, 1), narrowed(robot, task.margin), Bodies(robot, wall)
-    found = find_places(robot, task, asked_of(robot, 1), 0.05, 3, free=lambda q: bodies.free(q, margin))
-    rotations = tool_rotations(cone_directions(down, task.half_angle), roll)[:, 0]
-    spacing, places, moved = found.field.spacing, found.places, 0
-    for row in found.chosen:
-        size = task.box[[1, 0, 2]] if places.turned[row] else task.box
-        count = np.ceil(size / spacing - 1e-6).astype(int) + 1
-        lattice = (np.indices(count).reshape(3, -1).T - (count - 1) / 2) * spacing
-        for (axis, way), room in np.ndenumerate(found.room(row)):
-            centre = places.centre[row] + (2 * way - 1) * room * np.eye(3)[axis]
-            solved = inverse_batch(held, poses((centre + lattice)[:, None], rotations).reshape(-1, 4, 4))
-            clear = solved.within_limits.copy()
-            clear[clear] = bodies.min_distance(solved.q[clear])[0] >= margin - 1e-9
-            assert clear.any(axis=1).all(), (row, axis, way)
-            moved += room > 0
-    assert moved >= 4
-    beyond = find_places(robot, task, asked_of(robot, 1), 0.05, 3)
-    assert len(beyond.places.slot) > len(places.slot)

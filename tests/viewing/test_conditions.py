@@ -146,7 +146,7 @@ def test_a_point_enters_a_box_when_a_dense_walk_along_its_polyline_does(random):
 
 def placed(**stands) -> SimpleNamespace:
     """The workspace stage's results, which put a box of 200 x 150 x 50 mm at (350, 0, 400) mm."""
-    spot = PlaceSummary((0.35, 0.0, 0.4), (0.15, 0.2, 0.05), True, None, 1, 1, None, (0,) * 3, (0,) * 3)
+    spot = PlaceSummary((0.35, 0.0, 0.4), (0.15, 0.2, 0.05), True, None, 1, None)
     stand = [StandSummary("table", 0.1, None, None, "in_the_way", spot)] if stands.get("over") else []
     task = task_summary(BoxTask())
     found = PlacementSummary(None, 20, task, (0.02,) * 3, 45, 1, 1, (spot,), tuple(stand))

@@ -23,7 +23,7 @@ def drawn(joint, links=LINKS, **load):
     """The marks of a joint that holds the links in the pose Q_DEG."""
     summary = SimpleNamespace(
         masses=SimpleNamespace(**({"links": links, "load_kg": None} | load)),
-        holding=[HoldingTorque(joint, 1.0, 1.0, 0.1, "N m", Q_DEG)],
+        holding=[HoldingTorque(joint, 1.0, 0.1, "N m", Q_DEG)],
     )
     return held(ROBOT, SimpleNamespace(summary=summary))[0].marks
 

@@ -22,7 +22,6 @@ from er3a.workspace.placement import (
     Places,
     Task,
     choose_places,
-    find_places,
     fits_on,
     fitting_places,
     lattice_spacing,
@@ -118,30 +117,6 @@ def test_places_serve_nearly_all_random_points_and_directions(name, random):
         within = inverse_batch(robot.replace(lower=tight.lower, upper=tight.upper), T[:, 0]).within_limits
         assert within.any(axis=1).mean() > (0.99 if row in chosen else 0.9)
         assert row not in chosen or places.slot[row] == MIXED or within[:, places.slot[row]].mean() > 0.99
-
-
-@pytest.mark.long
-def test_a_box_that_is_moved_as_far_as_is_said_is_served_on_the_way_and_no_step_farther(random):
-    robot, roll = load_robot("er3_600"), roll_of(load_robot("er3_600"), 2)
-    found = find_places(robot, TRAY, asked_of(robot, 2), 0.05, 4)
-    held, moved = narrowed(robot, TRAY.margin), 0
-    for row in found.chosen:
-        place = found.places.rows(np.array([row]))
-        size = TRAY.box[[1, 0, 2]] if place.turned[0] else TRAY.box
-        alike = found.places.turned == place.turned[0]
-        centres = {tuple(np.round(each, 6)) for each in found.places.centre[alike]}
-        for (axis, way), room in np.ndenumerate(found.room(row)):
-            beyond = place.centre[0].copy()
-            beyond[axis] += (2 * way - 1) * (room + found.field.spacing[axis])
-            assert tuple(np.round(beyond, 6)) not in centres
-            if room:
-                centre = place.centre[0].copy()
-                centre[axis] += (2 * way - 1) * random.uniform(0, room)
-                tried = random_service(TRAY, centre, size, roll, random, 100)
-                served = inverse_batch(held, tried.reshape(-1, 4, 4)).within_limits.any(axis=1)
-                assert served.reshape(len(tried), -1).any(axis=1).mean() > 0.9
-                moved += 1
-    assert moved >= 4
 
 
 def test_the_criterion_is_the_least_over_box_and_cone(random):

@@ -341,8 +341,6 @@ def _places_summary(places: free_space.ClearPlaces) -> model.PlacesSummary:
         clear=clear,
         joined=int(places.joined.sum()),
         tries_in_lost=int(places.tries[~places.clear].sum()),
-        reached_m3=len(places.clear) * cell,
-        clear_m3=clear * cell,
         lost_m3=(len(places.clear) - clear) * cell,
     )
 

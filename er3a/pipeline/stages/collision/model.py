@@ -31,8 +31,6 @@ class PlacesSummary:
     clear: int
     joined: int
     tries_in_lost: int
-    reached_m3: float
-    clear_m3: float
     lost_m3: float
 
 

@@ -32,7 +32,6 @@ from er3a.pipeline.stages.trajectory.motion import (
     corner_misses,
     listed_motions,
     task_of,
-    times_in,
 )
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes, program_files
 from er3a.pipeline.study import Study
@@ -320,7 +319,6 @@ def path_summary(
         name=entry.name,
         title=entry.title,
         kind=entry.kind,
-        times_in=times_in(entry),
         verdict=found.verdict,
         outcomes=found.outcomes,
         expect=entry.expected,

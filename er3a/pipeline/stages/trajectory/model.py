@@ -22,7 +22,6 @@ from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.names import FAULTS, PathVerdict, StrategyName
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table", "plan"]
-TimesIn = Literal["path_file", "table", "program"]
 FASTEST: Literal["fastest"] = "fastest"
 """In the table of strategies: the path itself, as fast as the joints can."""
 
@@ -215,7 +214,6 @@ class PathSummary:
     avoidance : the strategies tried; none where the path is safe
     strategy : the one to take
     of_program : what the check of the program that it is of finds, of at least caution, and the path does not show
-    times_in : what gives its times: the path file, a table, or a program
     """
 
     name: str
@@ -254,7 +252,6 @@ class PathSummary:
     clear_until: ClearUntil | None = None
     sound_end: SoundEnd | None = None
     of_program: tuple[FindingAt, ...] = ()
-    times_in: TimesIn = "path_file"
 
     @property
     def singular(self) -> list[Singularity | Jump]:

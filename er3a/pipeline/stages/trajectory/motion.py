@@ -13,7 +13,7 @@ import scipy
 from er3a.collision.along import RateBounds
 from er3a.collision.bodies import Bodies
 from er3a.errors import InputError, NotWristPartitionedError, PoseError
-from er3a.files.path_file import PathEntry, ProgramPath, TablePath, load_paths
+from er3a.files.path_file import PathEntry, ProgramPath, load_paths
 from er3a.files.units import joint_values
 from er3a.finding import Finding
 from er3a.kinematics.by_class import arm_solver
@@ -24,7 +24,6 @@ from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.scope import GAPS, Open
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.trajectory.model import TimesIn
 from er3a.pipeline.study import Study
 from er3a.planning.class_follow import PathEndsError, follow_by_class
 from er3a.planning.commands import Built, Command, CommandSource, PlanCommand, build
@@ -72,22 +71,6 @@ class PartOfProgram:
 
 
 PlannedEntry = PathEntry | PartOfProgram
-
-
-def times_in(entry: PlannedEntry) -> TimesIn:
-    """Where a path's times are given.
-
-    Parameters
-    ----------
-    entry : of a path file, or a stretch of a program
-
-    Returns
-    -------
-    place : ``program``, ``table`` (CSV) or ``path_file``
-    """
-    if isinstance(entry, PartOfProgram):
-        return "program"
-    return "table" if isinstance(entry, TablePath) and entry.duration_s is None else "path_file"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.collision.pairs import Pair
 from er3a.finding import Finding, is_one
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
@@ -215,7 +214,6 @@ class CapabilitySummary:
         in, turns about the axes of a SCARA, or points alone; ``directions`` is how many of these
     bar_m : length of cells along y of ``frame``, where joint 1 slides (``sectors`` are parts of it); 0 for rings
     arm_angles : at how many values of what a pose leaves open to a redundant arm each is tried (else 1)
-    named_branches : whether its branches have names
     coarse : whether cells are coarser and directions fewer than the study says, since a pose takes this arm long
     """
 
@@ -228,7 +226,6 @@ class CapabilitySummary:
     roll: RollSummary
     overall: Overall
     arm_angles: int
-    named_branches: bool
     coarse: bool
 
 
@@ -251,13 +248,10 @@ class PlaceSummary:
     Attributes
     ----------
     branch : configuration that serves it all, None if it changes within the tray or has no name
-    manipulability_m3 : smallest over the tray and its directions; manipulability_ratio : of the arm's best
+    manipulability_m3 : smallest over the tray and its directions
     limit_margin_deg : smallest distance of joints, and of sums of joints, from their limits, None without one branch,
         or without joints of less than a full turn
     clearance_mm : smallest distance of the arm from scene and itself over the samples, None if nothing can meet
-    clearance_pair : the bodies that are so near each other
-    limit_joint : the joint (from 1) that comes so near its limit
-    room_down_m, room_up_m : how far the tray can be moved towards -x, -y, -z and +x, +y, +z, one at a time, as good
     """
 
     centre_m: Triple
@@ -265,13 +259,8 @@ class PlaceSummary:
     turned: bool
     branch: BranchLabel | SlotName | None
     manipulability_m3: float
-    manipulability_ratio: float
     limit_margin_deg: float | None
-    room_down_m: Triple
-    room_up_m: Triple
     clearance_mm: float | None = None
-    clearance_pair: Pair | None = None
-    limit_joint: int | None = None
 
 
 WhyNoStand = Literal["too_low", "too_small", "out_of_reach", "in_the_way"]

@@ -41,7 +41,6 @@ from er3a.workspace.placement import (
     fitting_places,
     lattice_size,
     lattice_spacing,
-    limited_joints,
     narrowed,
     serving_arms,
     supports_of,
@@ -200,12 +199,9 @@ def tool_capability(
         roll=model.RollSummary(asked.roll.free, len(asked.roll.angles), asked.roll.last_joint),
         overall=overall(found, cells, frame.bar),
         arm_angles=tried_values(robot),
-        named_branches=bool(slot_labels(robot)),
         coarse=plan.coarse,
     )
-    placement, places = _placed(
-        robot, settings, task, plan, scene=scene, margin=margin, best=float(found.manipulability.max())
-    )
+    placement, places = _placed(robot, settings, task, plan, scene=scene, margin=margin)
     return ToolCapability(summary, placement, model.capability(middles, found, frame.bar > 0), places)
 
 
@@ -217,14 +213,8 @@ def _placed(
     *,
     scene: Scene | None,
     margin: float,
-    best: float,
 ) -> tuple[model.Placement, model.BoxPlaces]:
-    """Where the box can stand, the arm a margin (m) from what it may not touch.
-
-    Parameters
-    ----------
-    best : the arm's largest manipulability, m^3
-    """
+    """Where the box can stand, the arm a margin (m) from what it may not touch."""
     asked, wanted = plan.asked, fact("workspace.task", **vars(task_summary(settings.placement)))
     if not asked.in_cone(np.zeros((1, 3)), task.axis, task.half_angle, task.step).shape[1]:
         direction = model.triple(asked.tool[:, 2])
@@ -238,7 +228,7 @@ def _placed(
 
     def listed(own: Task, found: BoxPlacement) -> tuple[model.PlaceSummary, ...]:
         arms = _arms_at(within, free, own, asked, found)
-        return tuple(_with_nearest(place, bodies, q) for place, q in zip(_listed(robot, own, found, best), arms))
+        return tuple(_with_nearest(place, bodies, q) for place, q in zip(_listed(robot, own, found), arms))
 
     stands = []
     supports = supports_of(scene) if scene else ()
@@ -349,7 +339,7 @@ def task_summary(asked: BoxTask) -> model.TaskSummary:
 def _placement_summary(
     asked: BoxTask, task: Task, placement: BoxPlacement, scene: Scene | None, margin: float
 ) -> model.PlacementSummary:
-    """The placement as the summary has it; ``best`` is the arm's largest manipulability, m^3."""
+    """The placement as the summary has it."""
     places = placement.places
     return model.PlacementSummary(
         scene=scene.title if scene else None,
@@ -363,11 +353,11 @@ def _placement_summary(
     )
 
 
-def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> list[model.PlaceSummary]:
+def _listed(robot: Robot, task: Task, placement: BoxPlacement) -> list[model.PlaceSummary]:
     places, found = placement.places, []
     labels = slot_labels(robot) if tried_values(robot) == 1 else ()
     for row in placement.chosen:
-        slot, room, margin = int(places.slot[row]), placement.room(row), places.limit_margin[row] + task.margin
+        slot, margin = int(places.slot[row]), places.limit_margin[row] + task.margin
         found.append(
             model.PlaceSummary(
                 centre_m=model.triple(places.centre[row]),
@@ -375,10 +365,7 @@ def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> l
                 turned=bool(places.turned[row]),
                 branch=labels[slot] if labels and slot != MIXED else None,
                 manipulability_m3=float(places.manipulability[row]),
-                manipulability_ratio=float(places.manipulability[row]) / best if best > 0 else 0.0,
                 limit_margin_deg=float(np.degrees(margin)) if np.isfinite(margin) else None,
-                room_down_m=model.triple(room[:, 0]),
-                room_up_m=model.triple(room[:, 1]),
             )
         )
     return found
@@ -401,16 +388,6 @@ def _arms_at(within: Robot, free: Free, task: Task, asked: AskedOrientations, pl
 
 
 def _with_nearest(place: model.PlaceSummary, bodies: Bodies, q: Reals) -> model.PlaceSummary:
-    """A place with the smallest clearance of its arms (m, joints), rad, the pair that has it, and the joint nearest to
-    a limit."""
-    smallest, pair = bodies.min_distance(q)
-    nearest = int(smallest.argmin()) if len(smallest) else -1
-    if nearest >= 0 and np.isfinite(smallest[nearest]):
-        place = replace(
-            place, clearance_mm=1000 * float(smallest[nearest]), clearance_pair=bodies.pairs[int(pair[nearest])]
-        )
-    if place.limit_margin_deg is None or not len(q):
-        return place
-    robot = bodies.robot
-    room = np.where(limited_joints(robot), np.minimum(q - robot.lower, robot.upper - q), np.inf).min(axis=0)
-    return replace(place, limit_joint=int(room.argmin()) + 1)
+    """A place with the smallest clearance of its arms (m, joints), rad."""
+    smallest = bodies.min_distance(q)[0].min(initial=np.inf)
+    return replace(place, clearance_mm=1000 * float(smallest)) if np.isfinite(smallest) else place
