@@ -226,7 +226,7 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
     kept[-1] = len(s) - 1  # the end stays the end
     q, s = q[kept], s[kept]
     if len(s) == 2:
-        return within_limits(straight(*q, limits).curve, limits, elapsed)
+        return within_limits(straight(q[0], q[1], limits).curve, limits, elapsed)
     spline = scipy.interpolate.CubicSpline(s, q)
     cap = None if programmed is None else np.gradient(s, programmed[kept])
     constraint = toppra_library().constraint
