@@ -178,7 +178,7 @@ def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> 
 
     Returns
     -------
-    text : without the byte order mark, if it has one
+    text : without the byte order mark, if it has one; Windows' ends of lines are ``\\n``
 
     Raises
     ------
@@ -197,7 +197,7 @@ def text_of(path: Path, raw: bytes, encoding: str = "") -> str:
 
     Returns
     -------
-    text : without the byte order mark, if it has one
+    text : without the byte order mark, if it has one; Windows' ends of lines are ``\\n``
 
     Raises
     ------
@@ -205,6 +205,7 @@ def text_of(path: Path, raw: bytes, encoding: str = "") -> str:
         if they are in another encoding (with the number of the byte)
     """
     try:
-        return raw.decode(encoding or ("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"))
+        text = raw.decode(encoding or ("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", "not UTF-8 text", "Save the file as UTF-8") from None
+    return text.replace("\r\n", "\n")

@@ -653,7 +653,7 @@ def test_a_table_comes_from_standard_input_and_from_a_text(monkeypatch, tmp_path
 
 
 def test_a_study_names_a_table_as_it_is_found(tmp_path):
-    (tmp_path / "mine.md").write_text(markdown(IRB120, list(NAMES), "q{}"))
+    (tmp_path / "mine.md").write_text(markdown(IRB120, list(NAMES), "q{}"), encoding="utf-8")
     study = load_study("config/small.yaml")
     entry = study.entry("er3_600").model_copy(update={"file": str(tmp_path / "mine.md")})
     with pytest.warns(er3a.InputWarning):
@@ -693,8 +693,9 @@ IN_MATLAB = "DH = [0 0.29 0 -pi/2 0 0;\n 0 0 0.27 0 0 -pi/2];\n"
         "OFFSET = [0, -np.pi/2]\nQ_MIN = np.array([-2.9, -1.7])\nq_goal = [0.1, 0.2]\n",
     ],
 )
-def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text):
-    content, _ = read(tmp_path, text)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text, end):
+    content, _ = read(tmp_path, text.replace("\n", end))
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
     assert content.dh.convention == "standard"
 
