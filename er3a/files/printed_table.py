@@ -12,16 +12,16 @@ import itertools
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
-from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
+from er3a.files.arithmetic import CALLED, TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
 from er3a.files.csv_file import Lines
-from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
+from er3a.files.table_cells import MARKS, Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, Code, code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
@@ -62,10 +62,11 @@ _KIND_ELSEWHERE = re.compile(
 """A joint that slides, said outside the table."""
 _OFFSETS = re.compile(r"\b(\w*offsets?)\s*(?:\[\d*\])?\s*=\s*[\w.(]*[\[{]([^\[\]{}]*[1-9][^\[\]{}]*)[\]}]", re.I)
 """A list of offsets."""
+_OF_ANGLES = re.compile(r"(?i)_*(?:th|q|joint|angle)")
 SIGNS = {
     "modified": re.compile(
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
-        r"(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
+        r"(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|修改\s*d-?h|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
         r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
         r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)|"
         r"cos\((?P<twist>[^\n;]{1,40}?)\)[\s,;]+-(?:\w+\.)*sin\((?P=twist)\)[\s,;]+-[^,;\n]{0,40}sin\((?P=twist)\)",
@@ -83,8 +84,12 @@ SIGNS = {
 ``d sin(alpha)``, whatever its names (``cos(x), -sin(x), -sin(x)*y``), and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
-    r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
+    r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\((?:[^\W\d]{3,}[\s)]|[^()]*°\))|\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
+)
+
+_CHAIN = re.compile(
+    r"(?<![=!<>])=(?=[^=\n]*[-+*/^(])[ \t]*-?[\w.()]+(?:[ \t]*[-+*/^][ \t]*[\w.()]+)*[ \t]*=(?=[ \t]*[-+.\d])"
 )
 
 
@@ -99,6 +104,7 @@ class PrintedTable:
 
 
 MAX_BYTES = 200_000
+SAME_WITHIN = 0.01  # of the largest entry: the same numbers, rounded
 RIGHT_WITHIN = 1e-3  # rad and deg: right angles as printed with three decimals or more
 MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
 
@@ -161,18 +167,43 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     if all(re.match(r"\s*(?:[#%]|//|$)", line) for line in text.split("\n")):  # all of it is a comment
         text = re.sub(r"(?m)^[ \t]*(?:[#%]+|//+)", "", text)
     try:
-        found, from_code = _tables(text, columns)
+        (found, from_code), *others = _tables(text, columns)
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
     tables = list({str([row for _, row in table]): table for table in reversed(found[:9])}.values())[::-1]
     if not tables:
         return None
+    if len(tables) == 1:
+        one = _Table(path, text, tables[0], from_code).converted()
+        tables += [grid for grids, of_code in others for grid in grids if _differs(one, path, text, grid, of_code)]
     if len(tables) > 1:
         problem = (
             f"{len(tables)} D-H tables, at lines {' and '.join(str(one[0][0] or one[1][0]) for one in tables[:2])}"
         )
         raise InputError(path, None, problem, "Give a file with one of them")
-    return _Table(path, text, tables[0], from_code).converted()
+    return one
+
+
+def _differs(one: PrintedTable, path: Path, text: str, grid: Grid, from_code: bool) -> bool:
+    """Whether another table of the same text, in another notation, can be read and has other proportions."""
+    try:
+        other = _Table(path, text, grid, from_code).converted()
+    except InputError:
+        return False
+    rows = min(len(one.lines), len(other.lines))
+    return any(
+        abs(x - y) > SAME_WITHIN
+        for names in (("a", "d"), ("alpha",))
+        for x, y in zip(_proportions(one, names, rows), _proportions(other, names, rows))
+    )
+
+
+def _proportions(table: PrintedTable, names: Sequence[str], rows: int) -> list[float]:
+    """The values of some columns, in order of these, by the largest of them, so that units do not matter."""
+    columns = sorted(zip(*(cells for _, cells in table.lines[:rows])))
+    found = [float(cell or 0) for name, *cells in columns if name.partition("_")[0] in names for cell in cells]
+    largest = max(map(abs, found)) or 1.0
+    return [each / largest for each in found]
 
 
 def table_in(path: Path) -> bool:
@@ -215,27 +246,37 @@ def nearest_headings(text: str) -> str:
 # Where the table is ---------------------------------------------------------------------------------------------------
 
 
-def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
-    """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
-    for grids, kind in _read(text, columns):
-        if tables := [_with_names(table) for grid in grids for table in _headed(grid, columns)]:
-            return tables, kind == "program"
-    if bare := code_grids(text, headed=False):
+def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
+    """All tables of the first reader that finds one, their headings first, and whether they are a program's; then those
+    of the other readers, but for cells between blanks or commas, which programs have, too."""
+    found: list[tuple[list[Grid], bool]] = []
+    for read, kind in _readers(text, columns):
+        if found and (kind == "lines" or columns):
+            break
+        try:
+            tables = [_with_names(table) for grid in read() for table in _headed(grid, columns)]
+        except InputError:
+            if not found:
+                raise
+        else:
+            found += [(tables, kind == "program")] if tables else []
+    bare = () if found else code_grids(text, headed=False)
+    if bare:
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
-    return [], False
+    return found or [([], False)]
 
 
-def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], str]]:
-    """What each reader makes of a text, and what it reads: a program, blanks between cells, or other marks."""
+def _readers(text: str, columns: Sequence[str]) -> Iterator[tuple[Callable[[], list[Grid]], str]]:
+    """What reads a text, and what it takes it for: marks of a document, a program, or lines."""
     if columns:
-        yield code_grids(text, headed=False), "program"
-    yield html_grids(text) or latex_grids(text), "marks"
-    yield code_grids(text), "program"
+        yield lambda: code_grids(text, headed=False), "program"
+    yield lambda: html_grids(text) or latex_grids(text), "marks"
+    yield lambda: code_grids(text), "program"
     for mark, grid in line_grids(text):
-        yield [grid], "blanks" if mark.strip(" ") == "" else "marks"
-    yield _stacked(text), "marks"
+        yield lambda grid=grid: [grid], "marks" if mark == MARKS[0] else "lines"
+    yield lambda: _stacked(text), "lines"
 
 
 def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
@@ -346,18 +387,30 @@ class _Table:
             self.notes.append("base and tool of the program are not read")
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", text) if from_code else without_latex(plain(text))
+        if from_code and "offset" not in self.column:
+            self._take_offsets()
         self.given = self._given()
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             problem = f"'{kind[0]}' is no column of the table"
             raise InputError(path, "types of joints", problem, "Add a column of types")
-        for listed in _OFFSETS.finditer(self.text) if from_code and "offset" not in self.column else ():
-            if len(re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))) == len(self.rows):
+        self.columns: dict[str, list[str]] = {"joint": self._joints()}
+
+    def _take_offsets(self) -> None:
+        """Make a list of offsets that stands by itself a column, if no theta is in the table."""
+        found = [(each, re.split(r"[,;\s]+", each[2].strip(" ,;\n"))) for each in _OFFSETS.finditer(self.text)]
+        found = [(each, cells) for each, cells in found if len(cells) == len(self.rows)]
+        for listed, cells in found:
+            taken_off = re.search(rf"-\s*(?:\w+\.)*{listed[1]}\b", self.text)
+            if len(found) > 1 or "theta" in self.column or taken_off or not _OF_ANGLES.match(listed[1]):
                 line = self.text.count("\n", 0, listed.start()) + 1
                 problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
-                raise InputError(path, f"line {line}", problem, "Add them to theta, or remove that line")
-        self.columns: dict[str, list[str]] = {"joint": self._joints()}
+                raise InputError(self.path, f"line {line}", problem, "Add them to theta, or remove that line")
+            self.column["offset"] = k = len(self.header)
+            self.headings[k] = Heading("offset", "", False)
+            self.header.append(listed[1])
+            self.rows = [(line, [*row, cell]) for (line, row), cell in zip(self.rows, cells)]
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
         place = f"column {self.header[k]}"
@@ -397,6 +450,8 @@ class _Table:
 
     def _given(self) -> dict[str, str]:
         """Values of symbols, as expressions; a symbol with two values has none."""
+        # a2 = sqrt(3^2 + 4^2) = 5: what it amounts to
+        self.text = re.sub(_CHAIN, "=", self.text)
         several = r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$"
         given, together = _GIVEN.findall(re.sub(several, "", self.text)), re.findall(several, self.text)
         for names, values in together:
@@ -405,7 +460,8 @@ class _Table:
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
         found: dict[str, str] = {}
         for name, value, unit in given:
-            if not re.search(r"[\[\"']|\(\)$", value):
+            made = re.fullmatch(r"(?:\w+\.)*(\w+)\([\w.,\[\] ]*[^\W\d][\w.,\[\] ]*\)\s*", value)  # by another function
+            if not re.search(r"[\[\"']|\(\)$", value) and (made is None or made[1] in CALLED):
                 value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
                 found[name.strip()] = value if found.get(name.strip(), value) == value else TWO_VALUES
         plainly: dict[str, str] = {}

@@ -23,6 +23,8 @@ _BLOCK = re.compile(
 _AS_RECORDS = (
     (r"(?<=[\w\"'])[ \t]+(?=\w+=[\"'][^\"'\n]*[\"'][^<>\n]*/>)", ", "),
     (r"<\w+,([^<>\n]*)/>", r"{\1}"),  # attributes in XML
+    (r"(?m)^\W*\w+[ \t]+((?:\(\w+[ \t]+[-+\d.]+[ \t]*\)[ \t]*){3,9}).*$", r"{\1}"),  # YARP's (A 0.0) (D 0.0)
+    (r"\((\w+)[ \t]+([-+\d.]+)[ \t]*\)", r"\1=\2,"),
     (r"(?m)^[^=,;(\[{|\n]*:[ \t]*((?:\w+[ \t]*=[ \t]*[^,=(\[{\n]+,[ \t]*){2,8}\w+[ \t]*=[^,=(\[{\n]+)$", r"{\1}"),
 )
 """Rows of one line each, as records."""
@@ -146,7 +148,7 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     grids : of each its headings and rows, with their lines
     """
     code = Code(text)
-    matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), _listed(code)) if grid]
+    matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), *_listed(code)) if grid]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
     links, runs = _calls(code)
@@ -176,6 +178,9 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     )
     if not in_table or not group.inside.strip():
         return
+    used = [int(number) for number in re.findall(rf"\b{name}[\[(](\d+),\s*:", code.text)]
+    if is_matrix and used and len({*used}) < len(_rows(code, group)):
+        code.refuse(group.start, name, f"has rows that the program does not use: only {used}", "Leave them out")
     changes = [found for found in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(found, name)]
     for change in [*_MOVED.finditer(group.before), *changes]:
         place = change.end() if change in changes else group.start
@@ -476,8 +481,8 @@ def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[
     offset = cells.pop("offset", "0")
     row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
     row |= {"offset": "" if slides else offset, "type": "prismatic" if slides else "revolute"}
-    if slides and offset != "0":
-        row["d"] = f"{row['d']}+{offset}"
+    if slides:
+        row["d"] = offset  # its own d is no part of the transform
     row["convention"] = "modified" if re.search("mod|mdh", said) else "standard"
     return row | {"direction": "-1"} if "flip" in words else row
 
@@ -543,27 +548,48 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
     return _titled(code, rows, labels, group.before) if len(widths) == 1 and 3 <= min(widths) <= 8 else []
 
 
-def _listed(code: Code) -> Grid:
-    """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
-    rows, labels, arms = Grid(), list[str](), set[str]()
+_OF_ROW = re.compile(
+    r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|"
+    r"(?:(?:(?:static|const|constexpr|double|float)\s+)*(\w+\d)(?:\[[4-8]\])?|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)"
+    r"\s*$|setFixedTransform\([^\n]*,\s*$"
+)
+_OF_CALL = re.compile(r"(?<!def )(?<!function )\b()(\w*(?:dh|denavit|link|trans|frame|joint)\w*|[AT])\s*$", re.I)
+
+
+def _listed(code: Code) -> list[Grid]:
+    """Matrices with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``, or the calls
+    of one function, ``T1 = dh(0, 270, 0, q1)``."""
+    series: dict[str, tuple[Grid, list[str]]] = {}
     stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
     for group in code.groups:
-        label = re.search(
-            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|"
-            r"(?:(?:(?:static|const|constexpr|double|float)\s+)*(\w+\d)(?:\[[4-8]\])?|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)"
-            r"\s*$|setFixedTransform\([^\n]*,\s*$",
-            group.before,
-        )
-        if label and label[2] and label[2] not in stacked and "dh" not in label[2].lower():
+        called = group.bracket == "("
+        label = (_OF_CALL if called else _OF_ROW).search(group.before)
+        name = (label[2] or "") if label else ""
+        own = _TOOLBOX.fullmatch(name) or name in code.orders or "addSegment" in group.before
+        kept = own if called else name and name not in stacked and "dh" not in name.lower()
+        if label is None or kept or re.search(r"[\[{:](?!\d+\])", group.inside):
             continue
-        if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
-            cells = row_cells(group.inside)
-            alike = len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= 8
-            if alike and all(re.search(r"\d|pi|π", cell) for cell in cells):
-                rows.append((code.line(group.start), cells))
-                labels.append(label[1] or label[2] or "")
-                arms.add((label[2] or "").rstrip("0123456789"))
-    return _titled(code, rows, labels) if len(rows) > 1 and len(arms) == 1 else []
+        rows, labels = series.setdefault(name + "(" if called else name.rstrip("0123456789"), (Grid(), []))
+        cells = row_cells(group.inside)
+        alike = len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= 8
+        if alike and all(re.search(r"\d|pi|π", cell) for cell in cells):
+            rows.append((code.line(group.start), cells))
+            labels.append("" if called else label[1] or name)
+        elif called and len(cells) > 3:  # what is no row of numbers
+            rows += [(0, [])] * 9
+    one = sum(name[-1:] != "(" for name in series) == 1  # rows of several names may be of several arms
+    return [
+        _titled(code, rows, labels)
+        for name, (rows, labels) in series.items()
+        if len(rows) > 1 and all(cells for _, cells in rows) and (_near(code, rows) if name[-1:] == "(" else one)
+    ]
+
+
+def _near(code: Code, rows: Grid) -> list[str]:
+    """The names of columns that a comment at the rows, or above them, says."""
+    lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
+    width = len(rows[0][1])
+    return next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
 
 
 def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid:
@@ -584,14 +610,13 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
     of a library."""
     width = len(rows[0][1])
-    lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
     typed = [
         names
         for name, names in code.orders.items()
         if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
         or (name in code.fields and re.search(rf"\b{name}\b", before))
     ]
-    near = next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
+    near = _near(code, rows)
     used = _columns_in(
         [
             *map(",".join, typed),
@@ -615,7 +640,7 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
 
 def _place(name: str) -> str:
     """What a column is, whether theta or its offset."""
-    return quantities_of([name])[0].replace("offset", "theta")
+    return next(iter(quantities_of([name])), name).replace("offset", "theta")
 
 
 def _columns_in(texts: Iterable[str], width: int) -> list[str]:
@@ -623,7 +648,8 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     found: dict[str, list[str]] = {}
     for text in texts:
         text = re.sub(r"(?<=,)(\s*)_(?=,|$)", r"\1theta", re.sub(r"\b(?:joint_?)?type\b", "sigma", text))
-        text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
+        text = re.sub(r"(?<=\w)\s*[({_]*\s*i\s*-\s*1\s*[)}]*", "_i-1", text)
+        text = re.sub(r"(?<=\w)(?:\s*\(\s*i\s*\)|\s+i(?=\s*,|$))", "_i", text)
         words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text) if word]
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
         # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
@@ -682,7 +708,7 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
         name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[\d*\]\w+)?[\"']?$",
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\]|\(1:\w+\))?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[\d*\]\w+)?[\"']?$",
             group.before,
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
@@ -748,29 +774,36 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
     return [[(0, [header[name] for name in named]), *((1, list(row)) for row in zip(*named.values()))]]
 
 
+_USED = re.compile(
+    r"[\[(,;]\s*-?(?:al(?:p|ph|f)a?)[_({\[]*\d[)}\]]*+\s*[,;\])]|\b(?:q|th(?:eta)?)_?[\[({]?\d[\])}]?\s*[-+]\s*(?:\d|\w*\.?pi\b)",
+    re.I,
+)
+"""Symbols that are entries of a matrix, or a sum with a joint's variable."""
 _OF_VECTORS = words_of("a alpha d theta offset type direction pose")
 
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
-    name = r"(?<![\"'\w])(?:DH_)?(al(?:ph|f)a|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)_?(\d{1,2})\s*([:=])"
-    pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s](?:::|[^,}}\n;:=!])*)"
+    name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)[_({\[]*(\d{1,2})[)}\]]*(?(1)\1)"
+    pattern = rf"{name}\s*([:=])(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s\[{{](?:::|[^,}}\n;:=!])*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
     for each in re.finditer(
         pattern, re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I
     ):
-        found.setdefault(each[1].lower(), {}).setdefault(int(each[2]), each)
-    if not {*quantities_of(found)} >= {"alpha", "a", "d"} or (len(found) == 3 and "DH_A" not in code.text):
-        return  # they may be in a matrix of these symbols
+        found.setdefault(each[2].lower(), {}).setdefault(int(each[3]), each)
+    if not {*quantities_of(found)} >= {"alpha", "a", "d"}:
+        return
+    if len(found) == 3 and "DH_A" not in code.text and (used := _USED.search(code.text)):
+        code.refuse(used.start(), used[0], "is no column of a table", "Write a list of theta or offset")
     for name, entries in found.items():
-        last, cells = entries[max(entries)], {k: each[4].strip() for k, each in entries.items()}
+        last, cells = entries[max(entries)], {k: each[5].strip() for k, each in entries.items()}
         of_link = found["alpha" if name in ("alpha", "a") else "d"]
         first = min(entries) if len(entries) == len(of_link) else min(of_link)
         gaps = {*range(first, max(entries) + 1)} - {*entries}
-        if gaps and last[3] == ":" and _place(name) == "theta":  # what is not replaced stays a variable
+        if gaps and last[4] == ":" and _place(name) == "theta":  # what is not replaced stays a variable
             cells |= {k: f"{name}{k}" for k in gaps}
         elif gaps:
             code.refuse(last.start(), f"{name}{min(gaps)}", "is missing", "Give one for each joint")
         before = "(i-1)" if min(of_link) < max(min(each) for each in found.values()) else ""
-        yield name + before, [cells[k] for k in sorted(cells)], code.line(last.start()), last[3]
+        yield name + before, [cells[k] for k in sorted(cells)], code.line(last.start()), last[4]
