@@ -8,7 +8,6 @@ ways is refused, with both.
 from __future__ import annotations
 
 import html
-import itertools
 import math
 import re
 import sys
@@ -31,6 +30,7 @@ from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
 FIXED = "fixed", "tool"
 NEEDED = frozenset({"a", "alpha", "d"})
 PER_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+_SCALES = PER_MM | {"deg": 1.0, "rad": math.degrees(1.0)}
 OWN = words_of("type theta beta calibrated direction convention lower upper speed")
 _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
@@ -84,13 +84,23 @@ SIGNS = {
 ``d sin(alpha)``, whatever its names (``cos(x), -sin(x), -sin(x)*y``), and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
-    r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\((?:[^\W\d]{3,}[\s)]|[^()]*°\))|\s+[^\W\d][\w{}]*[ \t]*=|$)"
+    r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\((?:[^\W\d]{3,}[\s)]|[^()]*°\))|"
+    r"\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
 _CHAIN = re.compile(
     r"(?<![=!<>])=(?=[^=\n]*[-+*/^(])[ \t]*-?[\w.()]+(?:[ \t]*[-+*/^][ \t]*[\w.()]+)*[ \t]*=(?=[ \t]*[-+.\d])"
 )
+_SEVERAL = re.compile(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$")
+_CALL = re.compile(r"(?:\w+\.)*(\w+)\([\w.,\[\] ]*[^\W\d][\w.,\[\] ]*\)\s*")
+"""A call of a function of names, whose value nobody knows."""
+
+
+def _one_by_one(found: re.Match[str]) -> str:
+    """``a, b = 1, 2`` as one line for each."""
+    names, values = found[1].split(","), found[2].strip(" ;").split(",")
+    return "\n".join(map("=".join, zip(names, values))) if len(names) == len(values) else ""
 
 
 @dataclass(frozen=True)
@@ -104,7 +114,6 @@ class PrintedTable:
 
 
 MAX_BYTES = 200_000
-SAME_WITHIN = 0.01  # of the largest entry: the same numbers, rounded
 RIGHT_WITHIN = 1e-3  # rad and deg: right angles as printed with three decimals or more
 MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
 
@@ -173,37 +182,23 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     tables = list({str([row for _, row in table]): table for table in reversed(found[:9])}.values())[::-1]
     if not tables:
         return None
-    if len(tables) == 1:
-        one = _Table(path, text, tables[0], from_code).converted()
-        tables += [grid for grids, of_code in others for grid in grids if _differs(one, path, text, grid, of_code)]
+    tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]
     if len(tables) > 1:
         problem = (
             f"{len(tables)} D-H tables, at lines {' and '.join(str(one[0][0] or one[1][0]) for one in tables[:2])}"
         )
         raise InputError(path, None, problem, "Give a file with one of them")
-    return one
+    return _Table(path, text, tables[0], from_code).converted()
 
 
-def _differs(one: PrintedTable, path: Path, text: str, grid: Grid, from_code: bool) -> bool:
-    """Whether another table of the same text, in another notation, can be read and has other proportions."""
-    try:
-        other = _Table(path, text, grid, from_code).converted()
-    except InputError:
-        return False
-    rows = min(len(one.lines), len(other.lines))
-    return any(
-        abs(x - y) > SAME_WITHIN
-        for names in (("a", "d"), ("alpha",))
-        for x, y in zip(_proportions(one, names, rows), _proportions(other, names, rows))
-    )
-
-
-def _proportions(table: PrintedTable, names: Sequence[str], rows: int) -> list[float]:
-    """The values of some columns, in order of these, by the largest of them, so that units do not matter."""
-    columns = sorted(zip(*(cells for _, cells in table.lines[:rows])))
-    found = [float(cell or 0) for name, *cells in columns if name.partition("_")[0] in names for cell in cells]
-    largest = max(map(abs, found)) or 1.0
-    return [each / largest for each in found]
+def _differ(one: Grid, other: Grid) -> bool:
+    """Whether each of two tables has a length that the other lacks, in whatever unit: their digits are compared."""
+    found = []
+    for (_, header), *rows in (one, other):
+        lengths = [k for k, name in enumerate(header) if (own := heading_of(name)) and own.quantity in ("a", "d")]
+        cells = [re.sub(r"[-+. ]|(?<=\d)f?$|(?:mm|m)$", "", row[k]) for _, row in rows for k in lengths if k < len(row)]
+        found.append({cell.strip("0") for cell in cells if cell.isdecimal()})
+    return bool(found[0] - found[1] and found[1] - found[0])
 
 
 def table_in(path: Path) -> bool:
@@ -333,21 +328,18 @@ def _with_names(table: Grid) -> Grid:
 
 def _stacked(text: str) -> list[Grid]:
     """A table that was copied with each cell on a line of its own, as far as its rows are a table's."""
-    lines = [line.strip() for line in without_latex(plain(text)).split("\n")]
-    cells = [(number, line) for number, line in enumerate(lines, 1) if line]
-    width = 0
-    for place, (_, cell) in enumerate(cells):
-        rows = [cells[k : k + width] for k in range(place - width, len(cells), width)] if width else []
-        grid = [(row[0][0], [text for _, text in row]) for row in rows]
-        if heading_of(cell):
-            width += 1
-        elif grid and is_printed_table(grid[0][1]):
+    lines = enumerate(without_latex(plain(text)).split("\n"), 1)
+    cells = [(number, line.strip()) for number, line in lines if line.strip()]
+    titles = "".join("t" if heading_of(cell) else " " for _, cell in cells)
+    for found in re.finditer("t{4,}", titles):
+        width, first = len(found[0]), found.start()
+        rows = [cells[k : k + width] for k in range(first, len(cells), width)]
+        grid = [(row[0][0], [cell for _, cell in row]) for row in rows]
+        if is_printed_table(grid[0][1]):
             end = next((k for k, (_, row) in enumerate(grid) if k and not (len(row) == width and _numeric(row))), None)
             if end and re.fullmatch(r"[-\d.]+", grid[end][1][0]):
                 raise InputError(None, f"line {grid[0][0]}", "cells are missing in the last row", "Add them")
             return [grid[:end]]
-        else:
-            width = 0
     return []
 
 
@@ -399,11 +391,12 @@ class _Table:
 
     def _take_offsets(self) -> None:
         """Make a list of offsets that stands by itself a column, if no theta is in the table."""
-        found = [(each, re.split(r"[,;\s]+", each[2].strip(" ,;\n"))) for each in _OFFSETS.finditer(self.text)]
-        found = [(each, cells) for each, cells in found if len(cells) == len(self.rows)]
-        for listed, cells in found:
+        for listed in _OFFSETS.finditer(self.text):
+            cells = re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))
             taken_off = re.search(rf"-\s*(?:\w+\.)*{listed[1]}\b", self.text)
-            if len(found) > 1 or "theta" in self.column or taken_off or not _OF_ANGLES.match(listed[1]):
+            if len(cells) != len(self.rows):
+                continue
+            if {"theta", "offset"} & {*self.column} or taken_off or not _OF_ANGLES.match(listed[1]):
                 line = self.text.count("\n", 0, listed.start()) + 1
                 problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
                 raise InputError(self.path, f"line {line}", problem, "Add them to theta, or remove that line")
@@ -452,18 +445,15 @@ class _Table:
         """Values of symbols, as expressions; a symbol with two values has none."""
         # a2 = sqrt(3^2 + 4^2) = 5: what it amounts to
         self.text = re.sub(_CHAIN, "=", self.text)
-        several = r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$"
-        given, together = _GIVEN.findall(re.sub(several, "", self.text)), re.findall(several, self.text)
-        for names, values in together:
-            if names.count(",") == values.count(","):
-                given += zip(names.split(","), map(str.strip, values.strip(" ;").split(",")), itertools.repeat(""))
+        self.text = re.sub(_SEVERAL, _one_by_one, self.text)
+        given = _GIVEN.findall(self.text)
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
         found: dict[str, str] = {}
         for name, value, unit in given:
-            made = re.fullmatch(r"(?:\w+\.)*(\w+)\([\w.,\[\] ]*[^\W\d][\w.,\[\] ]*\)\s*", value)  # by another function
+            made = _CALL.fullmatch(value)
             if not re.search(r"[\[\"']|\(\)$", value) and (made is None or made[1] in CALLED):
                 value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
-                found[name.strip()] = value if found.get(name.strip(), value) == value else TWO_VALUES
+                found[name] = value if found.get(name, value) == value else TWO_VALUES
         plainly: dict[str, str] = {}
         for name, value in found.items():
             plainly[name_of(name)] = value if plainly.get(name_of(name), value) == value else TWO_VALUES
@@ -608,19 +598,17 @@ class _Table:
                 raise InputError(
                     self.path, f"row {self.rows[row][0]}", problem, "Give the rows of one arm, in their order"
                 )
-        order = [str(joint) for joint in range(1, len(moving) + 1)]
-        labels = order
-        if (k := self.column.get("joint")) is not None:
-            texts = [plain(self.rows[row][1][k]).strip() for row in moving]
-            firsts = [_label(text, 0) for text in texts]
-            labels = firsts if firsts == order else [_label(text, -1) for text in texts]
-            numbered = [int(label) for label in labels if label.isdecimal()]
-            from_zero = numbered == list(range(len(labels)))
-            by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(numbered, moving)}) == 1
-            if from_zero:
+        labels = order = [str(joint) for joint in range(1, len(moving) + 1)]
+        k = self.column.get("joint", -1)
+        texts = [re.findall(r"\d+", plain(self.rows[row][1][k])) for row in moving] if k >= 0 else []
+        if texts and all(texts):  # names such as Elbow, Wrist 1 say no order
+            named = [[text[end] for text in texts] for end in (0, -1)]  # 0-1 is joint 1
+            firsts = [int(number) for number in named[0]]
+            by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(firsts, moving)}) == 1
+            if order not in named and firsts == [*range(len(moving))]:
                 self.notes.append("joints are numbered from 0")
-            if from_zero or by_row or len(numbered) < len(labels):  # names such as Elbow, Wrist 1 say no order
-                labels = order
+            elif order not in named and not by_row:
+                labels = named[-1]
         found = dict(zip(moving, labels))
         return [found.get(row, "") for row in range(len(self.kinds))]
 
@@ -690,15 +678,4 @@ class _Table:
 
 def _in(amount: CellAmount, unit: str) -> float:
     """An amount's number in a unit, which is its own if it has none."""
-    if amount.unit in ("", unit):
-        return amount.number
-    if unit in PER_MM:
-        return amount.number * PER_MM[amount.unit] / PER_MM[unit]
-    return math.degrees(amount.number) if unit == "deg" else math.radians(amount.number)
-
-
-def _label(cell: str, place: int) -> str:
-    """The number of a joint in its name; of two, as in 0-1, that at a place."""
-    pair = re.search(r"(\d+)\s*(?:[-→>/]|to)+\s*(\d+)", cell)
-    found = pair.groups() if pair else re.findall(r"\d+", cell)[:1]
-    return found[place] if found else cell
+    return amount.number * (_SCALES[amount.unit] / _SCALES[unit] if amount.unit else 1.0)

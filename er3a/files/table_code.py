@@ -88,6 +88,11 @@ class Code:
         """The number of the line of a place in the text."""
         return self.text.count("\n", 0, place) + 1
 
+    def order_near(self, last: int, first: int, width: int) -> list[str]:
+        """The names of columns that a comment says, in the last lines up to six above the first row."""
+        lines = range(last, max(first - 6, 0), -1)
+        return next((names for k in lines if (names := _columns_in([self.comments.get(k, "")], width))), [])
+
     def refuse(self, place: int, text: str, problem: str, remedy: str) -> NoReturn:
         """Refuse a passage, which is quoted."""
         raise InputError(None, f"line {self.line(place)}", f"'{' '.join(text.split())[:60]}' {problem}", remedy)
@@ -148,7 +153,7 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     grids : of each its headings and rows, with their lines
     """
     code = Code(text)
-    matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), *_listed(code)) if grid]
+    matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), _listed(code)) if grid]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
     links, runs = _calls(code)
@@ -365,6 +370,10 @@ def _segments(code: Code, rows: list[_Link], runs: list[CodeGroup]) -> None:
 _KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
 
 
+_OF_ROWS = re.compile(r"\w*(?:dh|denavit|link|trans|frame)\w*|[AT]", re.I)
+"""Names of functions of a row, whose order a comment may say."""
+
+
 def _signatures(code: Code) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
@@ -373,6 +382,9 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         alike = sorted(map(_place, quantities_of(names))) == ["a", "alpha", "d", "theta"]
+        if not alike and named and each.bracket == "(" and _OF_ROWS.fullmatch(named[1]) and len(names) == 4:
+            names = code.order_near(code.line(each.start), code.line(each.start), 4)
+            alike = bool(names)
         if alike and named and each.bracket != "{":
             made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
             orders.setdefault(made[-1] if made else "", names)
@@ -548,48 +560,27 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
     return _titled(code, rows, labels, group.before) if len(widths) == 1 and 3 <= min(widths) <= 8 else []
 
 
-_OF_ROW = re.compile(
-    r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|"
-    r"(?:(?:(?:static|const|constexpr|double|float)\s+)*(\w+\d)(?:\[[4-8]\])?|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)"
-    r"\s*$|setFixedTransform\([^\n]*,\s*$"
-)
-_OF_CALL = re.compile(r"(?<!def )(?<!function )\b()(\w*(?:dh|denavit|link|trans|frame|joint)\w*|[AT])\s*$", re.I)
-
-
-def _listed(code: Code) -> list[Grid]:
-    """Matrices with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``, or the calls
-    of one function, ``T1 = dh(0, 270, 0, q1)``."""
-    series: dict[str, tuple[Grid, list[str]]] = {}
+def _listed(code: Code) -> Grid:
+    """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
+    rows, labels, arms = Grid(), list[str](), set[str]()
     stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
     for group in code.groups:
-        called = group.bracket == "("
-        label = (_OF_CALL if called else _OF_ROW).search(group.before)
-        name = (label[2] or "") if label else ""
-        own = _TOOLBOX.fullmatch(name) or name in code.orders or "addSegment" in group.before
-        kept = own if called else name and name not in stacked and "dh" not in name.lower()
-        if label is None or kept or re.search(r"[\[{:](?!\d+\])", group.inside):
+        label = re.search(
+            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|"
+            r"(?:(?:(?:static|const|constexpr|double|float)\s+)*(\w+\d)(?:\[[4-8]\])?|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)"
+            r"\s*$|setFixedTransform\([^\n]*,\s*$",
+            group.before,
+        )
+        if label and label[2] and label[2] not in stacked and "dh" not in label[2].lower():
             continue
-        rows, labels = series.setdefault(name + "(" if called else name.rstrip("0123456789"), (Grid(), []))
-        cells = row_cells(group.inside)
-        alike = len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= 8
-        if alike and all(re.search(r"\d|pi|π", cell) for cell in cells):
-            rows.append((code.line(group.start), cells))
-            labels.append("" if called else label[1] or name)
-        elif called and len(cells) > 3:  # what is no row of numbers
-            rows += [(0, [])] * 9
-    one = sum(name[-1:] != "(" for name in series) == 1  # rows of several names may be of several arms
-    return [
-        _titled(code, rows, labels)
-        for name, (rows, labels) in series.items()
-        if len(rows) > 1 and all(cells for _, cells in rows) and (_near(code, rows) if name[-1:] == "(" else one)
-    ]
-
-
-def _near(code: Code, rows: Grid) -> list[str]:
-    """The names of columns that a comment at the rows, or above them, says."""
-    lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
-    width = len(rows[0][1])
-    return next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
+        if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
+            cells = row_cells(group.inside)
+            alike = len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= 8
+            if alike and all(re.search(r"\d|pi|π", cell) for cell in cells):
+                rows.append((code.line(group.start), cells))
+                labels.append(label[1] or label[2] or "")
+                arms.add((label[2] or "").rstrip("0123456789"))
+    return _titled(code, rows, labels) if len(rows) > 1 and len(arms) == 1 else []
 
 
 def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid:
@@ -616,7 +607,7 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
         if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
         or (name in code.fields and re.search(rf"\b{name}\b", before))
     ]
-    near = _near(code, rows)
+    near = code.order_near(rows[-1][0] + 1, rows[0][0], width)
     used = _columns_in(
         [
             *map(",".join, typed),
@@ -785,7 +776,8 @@ _OF_VECTORS = words_of("a alpha d theta offset type direction pose")
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
-    name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)[_({\[]*(\d{1,2})[)}\]]*(?(1)\1)"
+    name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)"
+    name += r"[_({\[]*(\d{1,2})[)}\]]*(?(1)\1)"
     pattern = rf"{name}\s*([:=])(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s\[{{](?:::|[^,}}\n;:=!])*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
     for each in re.finditer(
