@@ -73,7 +73,7 @@ class Code:
         text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
         def kept(found: re.Match[str]) -> str:
-            if found[1] is None and found[2]:
+            if found[2]:
                 self.comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
             return found[1] or ""
 
@@ -120,14 +120,11 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
         return Grid()
     if len(texts) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in texts):
         texts = [each[1:-1] for each in texts]
+    elif group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket):  # or MATLAB's cells
+        lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
+        texts = [each.strip("[], \t") for each in lines]
     else:
-        lines = [each.strip() for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-        flat = re.search(
-            r"dh(?:_?(?:param\w*|table|matrix))?(?:\[\d*\])?[\"']?\s*[:=]\s*$", group.before, re.I
-        )  # its rows are its lines
-        lists = ";" not in group.inside and not flat and any(each.endswith(",") for each in lines[:-1])
-        matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
-        texts = [] if lists or not matrix else [each.strip("[],") for each in lines]
+        texts = []
     grid, place = Grid(), group.start
     for text in texts:
         place = code.text.index(text, place)
@@ -245,7 +242,7 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
             if added and named[1] is None:
                 target = f"{added[1]}[{each.start}"
             rows.append(_Link(target, each.start, cells))
-        elif not cells and toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
+        elif toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
             unread.append(each)
     if "Frame::DH(" in code.text:
         _segments(code, rows, runs)
@@ -253,13 +250,12 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
         code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
-    looped = re.search(r"\bfor\b", code.text) and len(rows) == 1
-    if len(rows) > records and (re.search(_ADDED, code.text) or looped or runs):
+    if len(rows) > records and (re.search(_ADDED, code.text) or len(rows) == 1 or runs):
         code.refuse(rows[0].place, ", ".join(texts), *_OF_LOOP)
     names = {row.name: row for row in rows}
-    chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in code.groups if each.bracket == "["]
-    arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
-    held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups if each.bracket in "[{"]
+    chosen = [row_cells(each.inside) for each in code.groups if each.bracket == "["]
+    arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
+    held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
     held = [each for each in held if len(each) > 1]
     taken = [row for each in arms for row in each]
     held = [each for one in held or [rows] for each in _begun_again(one)]
@@ -426,13 +422,11 @@ class _Link:
 
 def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
     """Links by the arms that they belong to: a name that is used again begins another arm, another list does too."""
-    arms: list[list[_Link]] = [[]]
-    for row in rows:
-        last = arms[-1]
-        if last and (row.name in {other.name for other in last} - {""} or _list_of(row) != _list_of(last[-1])):
-            arms.append([])
-        arms[-1].append(row)
-    return arms
+    arms: dict[tuple[str, int], list[_Link]] = {}
+    for k, row in enumerate(rows):
+        uses = [other.name for other in rows[:k] if row.name].count(row.name)
+        arms.setdefault((_list_of(row), uses), []).append(row)
+    return [*arms.values()]
 
 
 def _list_of(row: _Link) -> str:
@@ -724,45 +718,39 @@ def _vectors(code: Code) -> list[Grid]:
 
 def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str, str]) -> list[Grid]:
     """The columns of a table by the names of their lists, or as links take them."""
-    named: dict[str, list[str]] = {}
-    header, line, places = dict[str, str](), 0, dict[str, tuple[int, str]]()
+    columns: dict[str, tuple[str, list[str], int, str]] = {}  # heading, cells, line, the list's name
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
         names = (taken.get(name, "-"),) if taken else (name, bare, bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
-        if heading and heading.quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
-            continue  # values of joints, or their limits
         quantity = heading.quantity if heading else name
-        if quantity == "theta" and mark == "=":
-            text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
-            if not re.search(r"[^\W\d]", text):
-                quantity = "pose" if name != "q" and re.search("[1-9]", text) else ""
-        if quantity == "a" and re.search(r"(?<![a-z])pi(?![a-z])|π|2rad|radians", " ".join(cells), re.I):
-            quantity = "alpha"
-        of_others = name in "Ll" and "a" in named and places["a"][1] not in "rR"
+        if quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
+            continue  # values of joints, or their limits
+        text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b|π|2rad|radians", "π", " ".join(cells), flags=re.I)
+        if quantity == "theta" and mark == "=" and not re.search(r"[^\W\dπ]", text):
+            quantity = "pose" if name != "q" and re.search("[1-9π]", text) else ""
+        quantity = "alpha" if quantity == "a" and "π" in text else quantity
+        of_others = name in "Ll" and columns.get("a", "r")[-1] not in "rR"
         if quantity not in _OF_VECTORS or not cells or of_others:
             continue
-        header[quantity] = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
-        places.setdefault(quantity, (line, name))
-        if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
-            problem = (
-                f"'{name}' is another list of {quantity} than '{places[quantity][1]}' of line {places[quantity][0]}"
-            )
+        title = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
+        _, first, place, other = columns.setdefault(quantity, (title, cells, line, name))
+        if first != cells and quantity not in ("theta", "pose"):
+            problem = f"'{name}' is another list of {quantity} than '{other}' of line {place}"
             raise InputError(None, f"line {line}", problem, "Give the lists of one arm, each with its own name")
-    if not {"a", "alpha", "d"} <= {*named}:
+    if not {"a", "alpha", "d"} <= {*columns}:
         return []
-    if named.pop("pose", None) and "theta" not in named:
-        line, name = places["pose"]
+    *_, place, name = columns.pop("pose", ("", 0, ""))
+    if name and "theta" not in columns:
+        problem = f"'{name}' may be offsets of the joints' angles, or a pose"
+        raise InputError(None, f"line {place}", problem, "Name it offset if theta = q + offset, or remove it")
+    titles, lengths, places, _ = zip(*columns.values())
+    if len({*map(len, lengths)}) > 1:
+        entries = ", ".join(f"{name} {len(cells)}" for name, (_, cells, _, _) in columns.items())
         raise InputError(
-            None,
-            f"line {line}",
-            f"'{name}' may be offsets of the joints' angles, or a pose",
-            "Name it offset if theta = q + offset, or remove it",
+            None, f"line {max(places)}", f"different numbers of entries: {entries}", "Give one for each joint"
         )
-    if len({len(cells) for cells in named.values()}) > 1:
-        problem = f"different numbers of entries: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
-        raise InputError(None, f"line {line}", problem, "Give one for each joint")
-    return [[(0, [header[name] for name in named]), *((1, list(row)) for row in zip(*named.values()))]]
+    return [[(0, [*titles]), *((1, list(row)) for row in zip(*lengths))]]
 
 
 _USED = re.compile(
