@@ -180,12 +180,18 @@ def _value(node: ast.expr, values: Mapping[str, CellAmount | str]) -> CellAmount
         return _called(str(values[node.func.id]), [_value(each, values) for each in node.args])
     if isinstance(node, ast.UnaryOp):
         return _product(CellAmount(-1.0 if isinstance(node.op, ast.USub) else 1.0), _value(node.operand, values))
-    if not isinstance(node, ast.BinOp) or type(node.op) not in _OPERATIONS:
+    if not isinstance(node, ast.BinOp):
         raise ValueError(_NONE)
     a, b = _value(node.left, values), _value(node.right, values)
     if isinstance(node.op, ast.MatMult) and a.variables:
         raise ValueError(f"is a variable in {b.unit}")
-    return _OPERATIONS[type(node.op)](a, b)
+    if isinstance(node.op, ast.Mult | ast.MatMult):
+        return _product(a, b)
+    if isinstance(node.op, ast.Div):
+        return _quotient(a, b)
+    if isinstance(node.op, ast.Pow):
+        return _power(a, b)
+    return _sum(a, b, -1 if isinstance(node.op, ast.Sub) else 1)
 
 
 def _called(name: str, values: list[CellAmount]) -> CellAmount:
@@ -203,7 +209,7 @@ def _called(name: str, values: list[CellAmount]) -> CellAmount:
         raise ValueError(f"has no value of {name}(...)") from None
 
 
-def _sum(a: CellAmount, b: CellAmount, sign: int = 1) -> CellAmount:
+def _sum(a: CellAmount, b: CellAmount, sign: int) -> CellAmount:
     if {a.unit, b.unit} == {"deg", "rad"}:  # each is said with its own unit
         a, b = (replace(x, number=math.radians(x.number), unit="rad") if x.unit == "deg" else x for x in (a, b))
     if a.unit and b.unit and a.unit != b.unit:
@@ -238,13 +244,3 @@ def _quotient(a: CellAmount, b: CellAmount) -> CellAmount:
     if b.unit and (b.unit != "rad" or a.unit):  # 180/pi is a number
         raise ValueError(f"divides by {b.unit}")
     return CellAmount(a.number / b.number, a.unit, {name: times / b.number for name, times in a.variables.items()})
-
-
-_OPERATIONS: dict[type[ast.operator], Callable[[CellAmount, CellAmount], CellAmount]] = {
-    ast.Add: _sum,
-    ast.Sub: lambda a, b: _sum(a, b, -1),
-    ast.Mult: _product,
-    ast.MatMult: _product,
-    ast.Div: _quotient,
-    ast.Pow: _power,
-}

@@ -62,7 +62,6 @@ _KIND_ELSEWHERE = re.compile(
 """A joint that slides, said outside the table."""
 _OFFSETS = re.compile(r"\b(\w*offsets?)\s*(?:\[\d*\])?\s*=\s*[\w.(]*[\[{]([^\[\]{}]*[1-9][^\[\]{}]*)[\]}]", re.I)
 """A list of offsets."""
-_OF_ANGLES = re.compile(r"(?i)_*(?:th|q|joint|angle)")
 SIGNS = {
     "modified": re.compile(
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
@@ -95,12 +94,6 @@ _CHAIN = re.compile(
 _SEVERAL = re.compile(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$")
 _CALL = re.compile(r"(?:\w+\.)*(\w+)\([\w.,\[\] ]*[^\W\d][\w.,\[\] ]*\)\s*")
 """A call of a function of names, whose value nobody knows."""
-
-
-def _one_by_one(found: re.Match[str]) -> str:
-    """``a, b = 1, 2`` as one line for each."""
-    names, values = found[1].split(","), found[2].strip(" ;").split(",")
-    return "\n".join(map("=".join, zip(names, values))) if len(names) == len(values) else ""
 
 
 @dataclass(frozen=True)
@@ -195,9 +188,9 @@ def _differ(one: Grid, other: Grid) -> bool:
     """Whether each of two tables has a length that the other lacks, in whatever unit: their digits are compared."""
     found = []
     for (_, header), *rows in (one, other):
-        lengths = [k for k, name in enumerate(header) if (own := heading_of(name)) and own.quantity in ("a", "d")]
-        cells = [re.sub(r"[-+. ]|(?<=\d)f?$|(?:mm|m)$", "", row[k]) for _, row in rows for k in lengths if k < len(row)]
-        found.append({cell.strip("0") for cell in cells if cell.isdecimal()})
+        lengths = [k for k, name in enumerate(header) if {"a", "d"}.intersection(quantities_of([name]))]
+        cells = " ".join(row[k] for _, row in rows for k in lengths if k < len(row))
+        found.append({each.strip("0") for each in re.findall(r"(?<!\w)\d+", cells.replace(".", ""))})
     return bool(found[0] - found[1] and found[1] - found[0])
 
 
@@ -353,6 +346,21 @@ def _turned(grid: Grid) -> list[Grid]:
     return [[(rows[0][0], list(column)) for column in zip(*(cells for _, cells in rows))]]
 
 
+def _with_offsets(path: Path, text: str, grid: Grid) -> Grid:
+    """A program's table with a list of offsets that stands by itself as a column, if no theta is in the table."""
+    (line, header), *rows = grid
+    for listed in _OFFSETS.finditer(text):
+        cells = re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))
+        of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle")) and f"- {listed[1]}" not in text
+        if len(cells) == len(rows) and "offset" not in quantities_of(header):
+            if not of_angles or "theta" in quantities_of(header):
+                place = f"line {text.count(chr(10), 0, listed.start()) + 1}"
+                problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
+                raise InputError(path, place, problem, "Add them to theta, or remove that line")
+            header, rows = [*header, "offset"], [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
+    return [(line, header), *rows]
+
+
 # What it says ---------------------------------------------------------------------------------------------------------
 
 
@@ -361,6 +369,9 @@ class _Table:
 
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
         self.path, self.notes, self.unsaid = path, list[str](), set[str]()
+        of_words = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
+        self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", of_words) if from_code else without_latex(plain(of_words))
+        grid = _with_offsets(path, self.text, grid) if from_code else grid
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
         for line, cells in self.rows:
             if len(cells) != len(self.header):
@@ -377,10 +388,6 @@ class _Table:
         self.convention = self._stated(Code(text).text if from_code else "", text)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
-        text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
-        self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", text) if from_code else without_latex(plain(text))
-        if from_code and "offset" not in self.column:
-            self._take_offsets()
         self.given = self._given()
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.kinds = self._kinds()
@@ -388,22 +395,6 @@ class _Table:
             problem = f"'{kind[0]}' is no column of the table"
             raise InputError(path, "types of joints", problem, "Add a column of types")
         self.columns: dict[str, list[str]] = {"joint": self._joints()}
-
-    def _take_offsets(self) -> None:
-        """Make a list of offsets that stands by itself a column, if no theta is in the table."""
-        for listed in _OFFSETS.finditer(self.text):
-            cells = re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))
-            taken_off = re.search(rf"-\s*(?:\w+\.)*{listed[1]}\b", self.text)
-            if len(cells) != len(self.rows):
-                continue
-            if {"theta", "offset"} & {*self.column} or taken_off or not _OF_ANGLES.match(listed[1]):
-                line = self.text.count("\n", 0, listed.start()) + 1
-                problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
-                raise InputError(self.path, f"line {line}", problem, "Add them to theta, or remove that line")
-            self.column["offset"] = k = len(self.header)
-            self.headings[k] = Heading("offset", "", False)
-            self.header.append(listed[1])
-            self.rows = [(line, [*row, cell]) for (line, row), cell in zip(self.rows, cells)]
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
         place = f"column {self.header[k]}"
@@ -445,7 +436,10 @@ class _Table:
         """Values of symbols, as expressions; a symbol with two values has none."""
         # a2 = sqrt(3^2 + 4^2) = 5: what it amounts to
         self.text = re.sub(_CHAIN, "=", self.text)
-        self.text = re.sub(_SEVERAL, _one_by_one, self.text)
+        pairs = (zip(names.split(","), values.split(",")) for names, values in _SEVERAL.findall(self.text))
+        self.text = "\n".join(
+            [_SEVERAL.sub("", self.text), *(f"{name} = {value}" for each in pairs for name, value in each)]
+        )
         given = _GIVEN.findall(self.text)
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
         found: dict[str, str] = {}

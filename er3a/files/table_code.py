@@ -316,21 +316,18 @@ def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
     used = [int(found[2]) for each in runs for found in list(_ELEMENT.finditer(each.inside))[-1:] if found[2].isdigit()]
     one_by_one = used in (list(range(rows)), list(range(1, rows + 1))) and len(runs) == rows
     given = {name for name, part in _given_to(code, toolbox=True) if part != "0"}
-    left_out = not given & {"offset", "theta", "row"} and any(map(_turns, grids))  # offsets that no link takes
+    turns = (
+        cell
+        for (_, header), *body in grids
+        for _, cells in body
+        for name, cell in zip(header, cells)
+        if _place(name) == "theta"
+    )
+    # offsets that no link takes
+    left_out = not given & {"offset", "theta", "row"} and re.search(r"[1-9]|pi|π", " ".join(turns), re.I)
     if grids and not left_out and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
         return
     code.refuse(runs[0].start, runs[0].inside, *_OF_LOOP)
-
-
-def _turns(grid: Grid) -> bool:
-    """Whether a table has angles theta, or offsets, that are not 0."""
-    cells = [
-        cell
-        for name, column in zip(grid[0][1], zip(*(cells for _, cells in grid[1:])))
-        if heading_of(name) and _place(name) == "theta"
-        for cell in column
-    ]
-    return bool(re.search(r"[1-9]|pi|π", " ".join(cells), re.I))
 
 
 def _goes_through(code: Code, call: CodeGroup, rows: int) -> bool:
@@ -620,7 +617,7 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     taken = (
         order.split(",") for library, (order, _) in LIBRARIES.items() if re.search(library, code.text) and width >= 4
     )
-    return next((names[:width] for names in taken if len(names) >= width), [])
+    return next((names[:width] for names in taken), [])
 
 
 def _place(name: str) -> str:
@@ -635,7 +632,7 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
         text = re.sub(r"(?<=,)(\s*)_(?=,|$)", r"\1theta", re.sub(r"\b(?:joint_?)?type\b", "sigma", text))
         text = re.sub(r"(?<=\w)\s*[({_]*\s*i\s*-\s*1\s*[)}]*", "_i-1", text)
         text = re.sub(r"(?<=\w)(?:\s*\(\s*i\s*\)|\s+i(?=\s*,|$))", "_i", text)
-        words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text) if word]
+        words = re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text)
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
         # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
         names = next((each for each in windows if _names_columns(each, once=len(each) > width)), [])
