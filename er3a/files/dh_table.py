@@ -315,11 +315,12 @@ def _in_own_units(
             doubt(None, "angles", f"{wide[0]:g} deg", "degrees that were converted twice", file=path)
         found = _twists_in_radians(rows, own, "alpha_deg" in without_unit)
         turned = {column for column in turned if _in_radians(rows, column)} if found else set()
+        named = ", ".join(sorted(turned))
         if turned and "alpha_deg" in without_unit:
-            doubt(None, ", ".join(sorted(turned)), f"{rows[0]['alpha_deg']:g} deg", "radians", file=path)
-            yield f"{', '.join(sorted(turned))} were read as radians; --angle-unit deg if they are degrees"
+            doubt(None, named, f"{rows[0]['alpha_deg']:g} deg", "radians", file=path)
+            yield f"{named} were read as radians; --angle-unit deg if they are degrees"
         elif turned:
-            yield f"{', '.join(sorted(turned))} look like radians: give --angle-unit rad if they are"
+            yield f"{named} look like radians: give --angle-unit rad if they are"
             turned = set()
         elif "alpha_deg" in without_unit and _in_radians(rows, "alpha_deg"):
             raise InputError(path, "column alpha", "small angles say no unit", "Give --angle-unit deg or rad")

@@ -166,13 +166,13 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     """
     text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)[ \t]+(.+)$", r"\1 = \2;", text)
     text = re.sub(r"&#?\w+;", lambda found: html.unescape(found[0]), text)
-    if all(re.match(r"\s*(?:[#%]|//|$)", line) for line in text.split("\n")):  # all of it is a comment
+    if not re.search(r"(?m)^[ \t]*(?![#%]|//)\S", text):  # all of it is a comment
         text = re.sub(r"(?m)^[ \t]*(?:[#%]+|//+)", "", text)
     try:
         (found, from_code), *others = _tables(text, columns)
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
-    tables = list({str([row for _, row in table]): table for table in reversed(found[:9])}.values())[::-1]
+    tables = [*{str([row for _, row in table]): table for table in found[:9]}.values()]
     if not tables:
         return None
     tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]
@@ -223,7 +223,7 @@ def is_printed_table(header: Iterable[str]) -> bool:
 def nearest_headings(text: str) -> str:
     """The line of a text with most headings of a D-H table, and what is missing among them, in words; "" if no line has
     two."""
-    rows = [row for _, grid in line_grids(text) for row in grid if len(row[1]) < 9]
+    rows = [row for _, grid in line_grids(text) for row in grid]
     line, cells = max(rows, key=lambda row: len({*quantities_of(row[1])}), default=(0, []))
     found = quantities_of(cells)
     missing = ", ".join(sorted(NEEDED.difference(found)))
@@ -239,7 +239,7 @@ def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
     of the other readers, but for cells between blanks or commas, which programs have, too."""
     found: list[tuple[list[Grid], bool]] = []
     for read, kind in _readers(text, columns):
-        if found and (kind == "lines" or columns):
+        if found and kind == "lines":
             break
         try:
             tables = [_with_names(table) for grid in read() for table in _headed(grid, columns)]
@@ -248,8 +248,7 @@ def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
                 raise
         else:
             found += [(tables, kind == "program")] if tables else []
-    bare = () if found else code_grids(text, headed=False)
-    if bare:
+    if not found and (bare := code_grids(text, headed=False)):
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
@@ -291,12 +290,12 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
             header = tables[-1][0][1]
             if len(tables[-1]) == 1 and filled and all(map(_unit_in, filled)) and len(cells) == len(header):
                 units = map(_unit_in, cells)
-                tables[-1][0] = line, [f"{name} [{unit}]" if unit else name for name, unit in zip(header, units)]
+                tables[-1][0] = line, [f"{name} [{unit}]" for name, unit in zip(header, units)]
             elif len(filled) < 2 or all("=" in cell for cell in filled):
                 broken = line
-            elif (len(cells) != len(header) and not _numeric(filled)) or (broken and not _numeric(filled)):
+            elif not _numeric(filled) and (broken or len(cells) != len(header)):
                 open_one = False
-            elif broken and len(tables[-1]) > 1 and _numeric(filled):
+            elif broken and len(tables[-1]) > 1:
                 raise InputError(None, f"line {broken}", "a line of text within the table", "Remove it")
             else:
                 tables[-1].append((line, cells))

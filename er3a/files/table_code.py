@@ -180,9 +180,9 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     )
     if not in_table or not group.inside.strip():
         return
-    used = [int(number) for number in re.findall(rf"\b{name}[\[(](\d+),\s*:", code.text)]
-    if is_matrix and used and len({*used}) < len(_rows(code, group)):
-        code.refuse(group.start, name, f"has rows that the program does not use: only {used}", "Leave them out")
+    used = {*re.findall(rf"\b{name}[\[(]\d+,\s*:", code.text)}
+    if is_matrix and 0 < len(used) < len(_rows(code, group)):
+        code.refuse(group.start, name, "has rows that the program does not use", "Leave them out")
     changes = [found for found in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(found, name)]
     for change in [*_MOVED.finditer(group.before), *changes]:
         place = change.end() if change in changes else group.start
@@ -239,7 +239,7 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
             added = re.search(
                 r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", each.before, re.S
             )
-            if added and named[1] is None:
+            if added:
                 target = f"{added[1]}[{each.start}"
             rows.append(_Link(target, each.start, cells))
         elif toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
@@ -445,7 +445,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
             cells[pending], pending = part, ""
         elif quoted and _FLAGS.fullmatch(quoted[1]):
             words.append(quoted[1].lower())
-        elif quoted and toolbox:
+        elif quoted:
             pending = _argument(quoted[1])
         elif part:
             given.append(part)
@@ -517,14 +517,16 @@ def _records(code: Code) -> list[Grid]:
         found = re.fullmatch(r"(\s*)(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
         if found is None:
             continue
-        key, rows = found[3].lower(), tables[-1]
-        if len(found[1]) < level and not found[4] and not re.search(r"\d", key):  # the name of another list
+        indent, dash, key, value = found.groups()
+        key, rows = key.lower(), tables[-1]
+        numbered = re.search(r"\d", key)
+        if len(indent) < level and not value and not numbered:  # the name of another list
             tables.append([(number, {})])
-        elif found[2] or key in rows[-1][1] or not found[4]:
-            rows.append((number, {"joint": key} if not found[4] and re.search(r"\d", key) else {}))
-            level = len(found[1])
-        if found[4]:
-            rows[-1][1][key] = found[4].strip(" \"'")
+        elif dash or key in rows[-1][1] or not value:
+            rows.append((number, {"joint": key} if not value and numbered else {}))
+            level = len(indent)
+        if value:
+            rows[-1][1][key] = value.strip(" \"'")
     full = [[row for row in rows if _is_row(row[1])] for rows in tables]
     return [_grid(rows) for rows in full if len(rows) > 1]
 
@@ -564,7 +566,7 @@ def _listed(code: Code) -> Grid:
         )
         if label and label[2] and label[2] not in stacked and "dh" not in label[2].lower():
             continue
-        if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
+        if label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
             alike = len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= 8
             if alike and all(re.search(r"\d|pi|π", cell) for cell in cells):
@@ -593,7 +595,7 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     of a library."""
     width = len(rows[0][1])
     typed = [
-        names
+        ",".join(names)
         for name, names in code.orders.items()
         if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
         or (name in code.fields and re.search(rf"\b{name}\b", before))
@@ -601,7 +603,7 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     near = code.order_near(rows[-1][0] + 1, rows[0][0], width)
     used = _columns_in(
         [
-            *map(",".join, typed),
+            *typed,
             *_UNPACKED.findall(code.text),
             *_ENUM.findall(code.text),
             *_LISTED.findall(code.text),
