@@ -462,15 +462,15 @@ class _Table:
         """
         unused = []
         for k, name in enumerate(self.header):
-            own = self.headings.get(k)
+            quantity = self.headings[k].quantity if k in self.headings else ""
             stem = re.sub(r"_(m|in|cm|rad|mm|deg)(_s)?$", "", name)
-            if own and own.quantity == "theta":
+            if quantity == "theta":
                 self._theta(k)
-            elif own and own.quantity not in ("joint", "type"):
-                self._constants(k, own.quantity)
-            elif own is None and (stem in OWN):
+            elif quantity not in ("", "joint", "type"):
+                self._constants(k, quantity)
+            elif not quantity and stem in OWN:
                 self.columns[name] = [cells[k] for _, cells in self.rows]
-            elif own is None and name not in ("", "-"):
+            elif not quantity and name not in ("", "-"):
                 unused.append(name)
                 if {cells[k].strip() for _, cells in self.rows} == {"0", "1"} and "type" not in {
                     *self.column,

@@ -226,14 +226,15 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
-        order, toolbox = code.orders.get(named[2], []), _TOOLBOX.fullmatch(named[2])
-        cells = _arguments(named[2], each.inside) or _of_signature(order, each.inside)
+        target, function = named.groups()
+        order, toolbox = code.orders.get(function, []), _TOOLBOX.fullmatch(function)
+        cells = _arguments(function, each.inside) or _of_signature(order, each.inside)
         plainly = not {"direction", "prismatic"} & {*cells, *cells.values()}
-        if cells and plainly and (toolbox or named[2] == "DH") and _from_lists(code, cells):
+        if cells and plainly and (toolbox or function == "DH") and _from_lists(code, cells):
             _check_taken(code, each, cells)
             runs.append(each)
         elif cells and (toolbox or _says_numbers(code, cells)):
-            target = re.sub(r"\s", "", named[1] or "")
+            target = re.sub(r"\s", "", target or "")
             if target.isidentifier() and "type" not in cells:
                 target = ""
             added = re.search(
@@ -766,23 +767,24 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)"
     name += r"[_({\[]*(\d{1,2})[)}\]]*(?(1)\1)"
     pattern = rf"{name}\s*([:=])(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s\[{{](?:::|[^,}}\n;:=!])*)"
-    found: dict[str, dict[int, re.Match[str]]] = {}
-    for each in re.finditer(
-        pattern, re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I
-    ):
-        found.setdefault(each[2].lower(), {}).setdefault(int(each[3]), each)
-    if not {*quantities_of(found)} >= {"alpha", "a", "d"}:
+    found: dict[str, dict[int, tuple[str, str, int]]] = {}  # value, mark and place of each number
+    text = re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text)
+    for each in re.finditer(pattern, text, re.I):
+        _, name, number, mark, value = each.groups()
+        found.setdefault(name.lower(), {}).setdefault(int(number), (value.strip(), mark, each.start()))
+    quantities = dict(zip(quantities_of(found), found.values()))
+    if not quantities.keys() >= {"alpha", "a", "d"}:
         return
     if len(found) == 3 and "DH_A" not in code.text and (used := _USED.search(code.text)):
         code.refuse(used.start(), used[0], "is no column of a table", "Write a list of theta or offset")
     for name, entries in found.items():
-        last, cells = entries[max(entries)], {k: each[5].strip() for k, each in entries.items()}
-        of_link = found["alpha" if name in ("alpha", "a") else "d"]
+        cells = {k: value for k, (value, _, _) in entries.items()}
+        _, mark, place = entries[max(entries)]
+        of_link = quantities["alpha" if _place(name) in ("alpha", "a") else "d"]
         first = min(entries) if len(entries) == len(of_link) else min(of_link)
         gaps = {*range(first, max(entries) + 1)} - {*entries}
-        if gaps and last[4] == ":" and _place(name) == "theta":  # what is not replaced stays a variable
-            cells |= {k: f"{name}{k}" for k in gaps}
-        elif gaps:
-            code.refuse(last.start(), f"{name}{min(gaps)}", "is missing", "Give one for each joint")
-        before = "(i-1)" if min(of_link) < max(min(each) for each in found.values()) else ""
-        yield name + before, [cells[k] for k in sorted(cells)], code.line(last.start()), last[4]
+        if gaps and (mark != ":" or _place(name) != "theta"):
+            code.refuse(place, f"{name}{min(gaps)}", "is missing", "Give one for each joint")
+        cells |= {k: f"{name}{k}" for k in gaps}  # what is not replaced stays a variable
+        before = "(i-1)" if min(of_link) < max(map(min, found.values())) else ""
+        yield name + before, [cells[k] for k in sorted(cells)], code.line(place), mark
