@@ -35,6 +35,8 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
     name: getattr(math, name.replace("arc", "a"))
     for name in words_of("sqrt atan arctan atan2 arctan2 asin acos sin cos")
 }
+CALLED = _RADIANS | _DEGREES | {*_FUNCTIONS}
+"""The functions that expressions may call."""
 _TOKEN = re.compile(
     r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([^\W\d][\w.]*'?|°)|(\*\*|[-+*/^(),\[\]]))\s*"
 )
@@ -135,7 +137,7 @@ def _in_python(text: str, given: Mapping[str, str], depth: int, values: dict[str
             is_unit = follows and word and word.lower() in UNITS and word not in given
             made += "@" if is_unit else "*" if follows else ""
             low = (word or "").rpartition(".")[2].lower()
-            calls = text[place : place + 1] in ("(", "[") and low in _RADIANS | _DEGREES | {*_FUNCTIONS}
+            calls = text[place : place + 1] in ("(", "[") and low in CALLED
             value: CellAmount | str = low
             if number and follows:  # 1 070, 0..90: no product
                 raise ValueError(_NONE)

@@ -233,18 +233,15 @@ def _join(before: dict[str, Any], fixed: Reals, after: dict[str, Any], conventio
     """Make a fixed transform (4, 4), mm, part of the link between two rows."""
     link = before if convention == "standard" else after
     T = _across(link) @ fixed if convention == "standard" else fixed @ _across(link)
-    (x, y, z), (u, v, w) = np.round(T[:3, 3], DIGITS) + 0.0, T[:3, 2]
-    sine = math.hypot(u, v)
-    skew = sine > PARALLEL
-    turn = math.atan2(u, -v) if skew else math.atan2(y, x)
-    a, across = x * math.cos(turn) + y * math.sin(turn), y * math.cos(turn) - x * math.sin(turn)
-    far = -across / sine if skew else 0.0
-    alpha = math.atan2(sine if skew else 0.0, w)
-    rest = rot_x(-alpha) @ rot_z(-turn) @ T
-    link |= {"a_mm": round(a, DIGITS), "alpha_deg": round(math.degrees(alpha), DIGITS)}
+    skew = math.hypot(T[0, 2], T[1, 2]) > PARALLEL
+    turn = math.atan2(T[0, 2], -T[1, 2]) if skew else math.atan2(*np.round(T[1::-1, 3], DIGITS))
+    T = rot_z(-turn) @ T  # Tz Tx(a) Rx(alpha) Rz Tz
+    far = T[1, 3] / T[1, 2] if skew else 0.0
+    alpha = math.atan2(-T[1, 2] if skew else 0.0, T[2, 2])
+    link |= {"a_mm": round(T[0, 3], DIGITS), "alpha_deg": round(math.degrees(alpha), DIGITS)}
     if link.get("beta_deg"):
         link["beta_deg"] = 0.0
-    ends = (before, turn, z - w * far), (after, math.atan2(rest[1, 0], rest[0, 0]), far)
+    ends = (before, turn, T[2, 3] - T[2, 2] * far), (after, math.atan2(-T[0, 1], T[0, 0]), far)
     for row, angle, shift in ends:
         theta = "theta_deg" if _unit(row) == "mm" else "offset_deg"
         row[theta] = round((row.get(theta) or 0.0) + math.degrees(angle), DIGITS)
@@ -318,11 +315,12 @@ def _in_own_units(
             doubt(None, "angles", f"{wide[0]:g} deg", "degrees that were converted twice", file=path)
         found = _twists_in_radians(rows, own, "alpha_deg" in without_unit)
         turned = {column for column in turned if _in_radians(rows, column)} if found else set()
+        named = ", ".join(sorted(turned))
         if turned and "alpha_deg" in without_unit:
-            doubt(None, ", ".join(sorted(turned)), f"{rows[0]['alpha_deg']:g} deg", "radians", file=path)
-            yield f"{', '.join(sorted(turned))} were read as radians; --angle-unit deg if they are degrees"
+            doubt(None, named, f"{rows[0]['alpha_deg']:g} deg", "radians", file=path)
+            yield f"{named} were read as radians; --angle-unit deg if they are degrees"
         elif turned:
-            yield f"{', '.join(sorted(turned))} look like radians: give --angle-unit rad if they are"
+            yield f"{named} look like radians: give --angle-unit rad if they are"
             turned = set()
         elif "alpha_deg" in without_unit and _in_radians(rows, "alpha_deg"):
             raise InputError(path, "column alpha", "small angles say no unit", "Give --angle-unit deg or rad")

@@ -8,20 +8,19 @@ ways is refused, with both.
 from __future__ import annotations
 
 import html
-import itertools
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
-from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
+from er3a.files.arithmetic import CALLED, TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
 from er3a.files.csv_file import Lines
-from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
+from er3a.files.table_cells import MARKS, Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, Code, code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
@@ -31,6 +30,7 @@ from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
 FIXED = "fixed", "tool"
 NEEDED = frozenset({"a", "alpha", "d"})
 PER_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+_SCALES = PER_MM | {"deg": 1.0, "rad": math.degrees(1.0)}
 OWN = words_of("type theta beta calibrated direction convention lower upper speed")
 _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
@@ -65,7 +65,7 @@ _OFFSETS = re.compile(r"\b(\w*offsets?)\s*(?:\[\d*\])?\s*=\s*[\w.(]*[\[{]([^\[\]
 SIGNS = {
     "modified": re.compile(
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
-        r"(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
+        r"(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|修改\s*d-?h|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
         r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
         r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)|"
         r"cos\((?P<twist>[^\n;]{1,40}?)\)[\s,;]+-(?:\w+\.)*sin\((?P=twist)\)[\s,;]+-[^,;\n]{0,40}sin\((?P=twist)\)",
@@ -83,9 +83,17 @@ SIGNS = {
 ``d sin(alpha)``, whatever its names (``cos(x), -sin(x), -sin(x)*y``), and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
-    r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
+    r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\((?:[^\W\d]{3,}[\s)]|[^()]*°\))|"
+    r"\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
+
+_CHAIN = re.compile(
+    r"(?<![=!<>])=(?=[^=\n]*[-+*/^(])[ \t]*-?[\w.()]+(?:[ \t]*[-+*/^][ \t]*[\w.()]+)*[ \t]*=(?=[ \t]*[-+.\d])"
+)
+_SEVERAL = re.compile(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$")
+_CALL = re.compile(r"(?:\w+\.)*(\w+)\([\w.,\[\] ]*[^\W\d][\w.,\[\] ]*\)\s*")
+"""A call of a function of names, whose value nobody knows."""
 
 
 @dataclass(frozen=True)
@@ -158,21 +166,32 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     """
     text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)[ \t]+(.+)$", r"\1 = \2;", text)
     text = re.sub(r"&#?\w+;", lambda found: html.unescape(found[0]), text)
-    if all(re.match(r"\s*(?:[#%]|//|$)", line) for line in text.split("\n")):  # all of it is a comment
+    if not re.search(r"(?m)^[ \t]*(?![#%]|//)\S", text):  # all of it is a comment
         text = re.sub(r"(?m)^[ \t]*(?:[#%]+|//+)", "", text)
     try:
-        found, from_code = _tables(text, columns)
+        (found, from_code), *others = _tables(text, columns)
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
-    tables = list({str([row for _, row in table]): table for table in reversed(found[:9])}.values())[::-1]
+    tables = [*{str([row for _, row in table]): table for table in found[:9]}.values()]
     if not tables:
         return None
+    tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]
     if len(tables) > 1:
         problem = (
             f"{len(tables)} D-H tables, at lines {' and '.join(str(one[0][0] or one[1][0]) for one in tables[:2])}"
         )
         raise InputError(path, None, problem, "Give a file with one of them")
     return _Table(path, text, tables[0], from_code).converted()
+
+
+def _differ(one: Grid, other: Grid) -> bool:
+    """Whether each of two tables has a length that the other lacks, in whatever unit: their digits are compared."""
+    found = []
+    for (_, header), *rows in (one, other):
+        lengths = [k for k, name in enumerate(header) if {"a", "d"}.intersection(quantities_of([name]))]
+        cells = " ".join(row[k] for _, row in rows for k in lengths if k < len(row))
+        found.append({each.strip("0") for each in re.findall(r"(?<!\w)\d+", cells.replace(".", ""))})
+    return bool(found[0] - found[1] and found[1] - found[0])
 
 
 def table_in(path: Path) -> bool:
@@ -204,7 +223,7 @@ def is_printed_table(header: Iterable[str]) -> bool:
 def nearest_headings(text: str) -> str:
     """The line of a text with most headings of a D-H table, and what is missing among them, in words; "" if no line has
     two."""
-    rows = [row for _, grid in line_grids(text) for row in grid if len(row[1]) < 9]
+    rows = [row for _, grid in line_grids(text) for row in grid]
     line, cells = max(rows, key=lambda row: len({*quantities_of(row[1])}), default=(0, []))
     found = quantities_of(cells)
     missing = ", ".join(sorted(NEEDED.difference(found)))
@@ -215,27 +234,36 @@ def nearest_headings(text: str) -> str:
 # Where the table is ---------------------------------------------------------------------------------------------------
 
 
-def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
-    """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
-    for grids, kind in _read(text, columns):
-        if tables := [_with_names(table) for grid in grids for table in _headed(grid, columns)]:
-            return tables, kind == "program"
-    if bare := code_grids(text, headed=False):
+def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
+    """All tables of the first reader that finds one, their headings first, and whether they are a program's; then those
+    of the other readers, but for cells between blanks or commas, which programs have, too."""
+    found: list[tuple[list[Grid], bool]] = []
+    for read, kind in _readers(text, columns):
+        if found and kind == "lines":
+            break
+        try:
+            tables = [_with_names(table) for grid in read() for table in _headed(grid, columns)]
+        except InputError:
+            if not found:
+                raise
+        else:
+            found += [(tables, kind == "program")] if tables else []
+    if not found and (bare := code_grids(text, headed=False)):
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
-    return [], False
+    return found or [([], False)]
 
 
-def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], str]]:
-    """What each reader makes of a text, and what it reads: a program, blanks between cells, or other marks."""
+def _readers(text: str, columns: Sequence[str]) -> Iterator[tuple[Callable[[], list[Grid]], str]]:
+    """What reads a text, and what it takes it for: marks of a document, a program, or lines."""
     if columns:
-        yield code_grids(text, headed=False), "program"
-    yield html_grids(text) or latex_grids(text), "marks"
-    yield code_grids(text), "program"
+        yield lambda: code_grids(text, headed=False), "program"
+    yield lambda: html_grids(text) or latex_grids(text), "marks"
+    yield lambda: code_grids(text), "program"
     for mark, grid in line_grids(text):
-        yield [grid], "blanks" if mark.strip(" ") == "" else "marks"
-    yield _stacked(text), "marks"
+        yield lambda grid=grid: [grid], "marks" if mark == MARKS[0] else "lines"
+    yield lambda: _stacked(text), "lines"
 
 
 def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
@@ -262,12 +290,12 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
             header = tables[-1][0][1]
             if len(tables[-1]) == 1 and filled and all(map(_unit_in, filled)) and len(cells) == len(header):
                 units = map(_unit_in, cells)
-                tables[-1][0] = line, [f"{name} [{unit}]" if unit else name for name, unit in zip(header, units)]
+                tables[-1][0] = line, [f"{name} [{unit}]" for name, unit in zip(header, units)]
             elif len(filled) < 2 or all("=" in cell for cell in filled):
                 broken = line
-            elif (len(cells) != len(header) and not _numeric(filled)) or (broken and not _numeric(filled)):
+            elif not _numeric(filled) and (broken or len(cells) != len(header)):
                 open_one = False
-            elif broken and len(tables[-1]) > 1 and _numeric(filled):
+            elif broken and len(tables[-1]) > 1:
                 raise InputError(None, f"line {broken}", "a line of text within the table", "Remove it")
             else:
                 tables[-1].append((line, cells))
@@ -292,21 +320,18 @@ def _with_names(table: Grid) -> Grid:
 
 def _stacked(text: str) -> list[Grid]:
     """A table that was copied with each cell on a line of its own, as far as its rows are a table's."""
-    lines = [line.strip() for line in without_latex(plain(text)).split("\n")]
-    cells = [(number, line) for number, line in enumerate(lines, 1) if line]
-    width = 0
-    for place, (_, cell) in enumerate(cells):
-        rows = [cells[k : k + width] for k in range(place - width, len(cells), width)] if width else []
-        grid = [(row[0][0], [text for _, text in row]) for row in rows]
-        if heading_of(cell):
-            width += 1
-        elif grid and is_printed_table(grid[0][1]):
+    lines = enumerate(without_latex(plain(text)).split("\n"), 1)
+    cells = [(number, line.strip()) for number, line in lines if line.strip()]
+    titles = "".join("t" if heading_of(cell) else " " for _, cell in cells)
+    for found in re.finditer("t{4,}", titles):
+        width, first = len(found[0]), found.start()
+        rows = [cells[k : k + width] for k in range(first, len(cells), width)]
+        grid = [(row[0][0], [cell for _, cell in row]) for row in rows]
+        if is_printed_table(grid[0][1]):
             end = next((k for k, (_, row) in enumerate(grid) if k and not (len(row) == width and _numeric(row))), None)
             if end and re.fullmatch(r"[-\d.]+", grid[end][1][0]):
                 raise InputError(None, f"line {grid[0][0]}", "cells are missing in the last row", "Add them")
             return [grid[:end]]
-        else:
-            width = 0
     return []
 
 
@@ -320,6 +345,21 @@ def _turned(grid: Grid) -> list[Grid]:
     return [[(rows[0][0], list(column)) for column in zip(*(cells for _, cells in rows))]]
 
 
+def _with_offsets(path: Path, text: str, grid: Grid) -> Grid:
+    """A program's table with a list of offsets that stands by itself as a column, if no theta is in the table."""
+    (line, header), *rows = grid
+    for listed in _OFFSETS.finditer(text):
+        cells = re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))
+        of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle")) and f"- {listed[1]}" not in text
+        if len(cells) == len(rows) and "offset" not in quantities_of(header):
+            if not of_angles or "theta" in quantities_of(header):
+                place = f"line {text.count(chr(10), 0, listed.start()) + 1}"
+                problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
+                raise InputError(path, place, problem, "Add them to theta, or remove that line")
+            header, rows = [*header, "offset"], [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
+    return [(line, header), *rows]
+
+
 # What it says ---------------------------------------------------------------------------------------------------------
 
 
@@ -328,6 +368,9 @@ class _Table:
 
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
         self.path, self.notes, self.unsaid = path, list[str](), set[str]()
+        of_words = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
+        self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", of_words) if from_code else without_latex(plain(of_words))
+        grid = _with_offsets(path, self.text, grid) if from_code else grid
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
         for line, cells in self.rows:
             if len(cells) != len(self.header):
@@ -344,19 +387,12 @@ class _Table:
         self.convention = self._stated(Code(text).text if from_code else "", text)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
-        text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
-        self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", text) if from_code else without_latex(plain(text))
         self.given = self._given()
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             problem = f"'{kind[0]}' is no column of the table"
             raise InputError(path, "types of joints", problem, "Add a column of types")
-        for listed in _OFFSETS.finditer(self.text) if from_code and "offset" not in self.column else ():
-            if len(re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))) == len(self.rows):
-                line = self.text.count("\n", 0, listed.start()) + 1
-                problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
-                raise InputError(path, f"line {line}", problem, "Add them to theta, or remove that line")
         self.columns: dict[str, list[str]] = {"joint": self._joints()}
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
@@ -397,17 +433,20 @@ class _Table:
 
     def _given(self) -> dict[str, str]:
         """Values of symbols, as expressions; a symbol with two values has none."""
-        several = r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$"
-        given, together = _GIVEN.findall(re.sub(several, "", self.text)), re.findall(several, self.text)
-        for names, values in together:
-            if names.count(",") == values.count(","):
-                given += zip(names.split(","), map(str.strip, values.strip(" ;").split(",")), itertools.repeat(""))
+        # a2 = sqrt(3^2 + 4^2) = 5: what it amounts to
+        self.text = re.sub(_CHAIN, "=", self.text)
+        pairs = (zip(names.split(","), values.split(",")) for names, values in _SEVERAL.findall(self.text))
+        self.text = "\n".join(
+            [_SEVERAL.sub("", self.text), *(f"{name} = {value}" for each in pairs for name, value in each)]
+        )
+        given = _GIVEN.findall(self.text)
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
         found: dict[str, str] = {}
         for name, value, unit in given:
-            if not re.search(r"[\[\"']|\(\)$", value):
+            made = _CALL.fullmatch(value)
+            if not re.search(r"[\[\"']|\(\)$", value) and (made is None or made[1] in CALLED):
                 value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
-                found[name.strip()] = value if found.get(name.strip(), value) == value else TWO_VALUES
+                found[name] = value if found.get(name, value) == value else TWO_VALUES
         plainly: dict[str, str] = {}
         for name, value in found.items():
             plainly[name_of(name)] = value if plainly.get(name_of(name), value) == value else TWO_VALUES
@@ -423,15 +462,15 @@ class _Table:
         """
         unused = []
         for k, name in enumerate(self.header):
-            own = self.headings.get(k)
+            quantity = self.headings[k].quantity if k in self.headings else ""
             stem = re.sub(r"_(m|in|cm|rad|mm|deg)(_s)?$", "", name)
-            if own and own.quantity == "theta":
+            if quantity == "theta":
                 self._theta(k)
-            elif own and own.quantity not in ("joint", "type"):
-                self._constants(k, own.quantity)
-            elif own is None and (stem in OWN):
+            elif quantity not in ("", "joint", "type"):
+                self._constants(k, quantity)
+            elif not quantity and stem in OWN:
                 self.columns[name] = [cells[k] for _, cells in self.rows]
-            elif own is None and name not in ("", "-"):
+            elif not quantity and name not in ("", "-"):
                 unused.append(name)
                 if {cells[k].strip() for _, cells in self.rows} == {"0", "1"} and "type" not in {
                     *self.column,
@@ -552,19 +591,17 @@ class _Table:
                 raise InputError(
                     self.path, f"row {self.rows[row][0]}", problem, "Give the rows of one arm, in their order"
                 )
-        order = [str(joint) for joint in range(1, len(moving) + 1)]
-        labels = order
-        if (k := self.column.get("joint")) is not None:
-            texts = [plain(self.rows[row][1][k]).strip() for row in moving]
-            firsts = [_label(text, 0) for text in texts]
-            labels = firsts if firsts == order else [_label(text, -1) for text in texts]
-            numbered = [int(label) for label in labels if label.isdecimal()]
-            from_zero = numbered == list(range(len(labels)))
-            by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(numbered, moving)}) == 1
-            if from_zero:
+        labels = order = [str(joint) for joint in range(1, len(moving) + 1)]
+        k = self.column.get("joint", -1)
+        texts = [re.findall(r"\d+", plain(self.rows[row][1][k])) for row in moving] if k >= 0 else []
+        if texts and all(texts):  # names such as Elbow, Wrist 1 say no order
+            named = [[text[end] for text in texts] for end in (0, -1)]  # 0-1 is joint 1
+            firsts = [int(number) for number in named[0]]
+            by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(firsts, moving)}) == 1
+            if order not in named and firsts == [*range(len(moving))]:
                 self.notes.append("joints are numbered from 0")
-            if from_zero or by_row or len(numbered) < len(labels):  # names such as Elbow, Wrist 1 say no order
-                labels = order
+            elif order not in named and not by_row:
+                labels = named[-1]
         found = dict(zip(moving, labels))
         return [found.get(row, "") for row in range(len(self.kinds))]
 
@@ -634,15 +671,4 @@ class _Table:
 
 def _in(amount: CellAmount, unit: str) -> float:
     """An amount's number in a unit, which is its own if it has none."""
-    if amount.unit in ("", unit):
-        return amount.number
-    if unit in PER_MM:
-        return amount.number * PER_MM[amount.unit] / PER_MM[unit]
-    return math.degrees(amount.number) if unit == "deg" else math.radians(amount.number)
-
-
-def _label(cell: str, place: int) -> str:
-    """The number of a joint in its name; of two, as in 0-1, that at a place."""
-    pair = re.search(r"(\d+)\s*(?:[-→>/]|to)+\s*(\d+)", cell)
-    found = pair.groups() if pair else re.findall(r"\d+", cell)[:1]
-    return found[place] if found else cell
+    return amount.number * (_SCALES[amount.unit] / _SCALES[unit] if amount.unit else 1.0)

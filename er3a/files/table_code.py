@@ -23,6 +23,8 @@ _BLOCK = re.compile(
 _AS_RECORDS = (
     (r"(?<=[\w\"'])[ \t]+(?=\w+=[\"'][^\"'\n]*[\"'][^<>\n]*/>)", ", "),
     (r"<\w+,([^<>\n]*)/>", r"{\1}"),  # attributes in XML
+    (r"(?m)^\W*\w+[ \t]+((?:\(\w+[ \t]+[-+\d.]+[ \t]*\)[ \t]*){3,9}).*$", r"{\1}"),  # YARP's (A 0.0) (D 0.0)
+    (r"\((\w+)[ \t]+([-+\d.]+)[ \t]*\)", r"\1=\2,"),
     (r"(?m)^[^=,;(\[{|\n]*:[ \t]*((?:\w+[ \t]*=[ \t]*[^,=(\[{\n]+,[ \t]*){2,8}\w+[ \t]*=[^,=(\[{\n]+)$", r"{\1}"),
 )
 """Rows of one line each, as records."""
@@ -71,7 +73,7 @@ class Code:
         text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
         def kept(found: re.Match[str]) -> str:
-            if found[1] is None and found[2]:
+            if found[2]:
                 self.comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
             return found[1] or ""
 
@@ -85,6 +87,11 @@ class Code:
     def line(self, place: int) -> int:
         """The number of the line of a place in the text."""
         return self.text.count("\n", 0, place) + 1
+
+    def order_near(self, last: int, first: int, width: int) -> list[str]:
+        """The names of columns that a comment says, in the last lines up to six above the first row."""
+        lines = range(last, max(first - 6, 0), -1)
+        return next((names for k in lines if (names := _columns_in([self.comments.get(k, "")], width))), [])
 
     def refuse(self, place: int, text: str, problem: str, remedy: str) -> NoReturn:
         """Refuse a passage, which is quoted."""
@@ -113,14 +120,11 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
         return Grid()
     if len(texts) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in texts):
         texts = [each[1:-1] for each in texts]
+    elif group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket):  # or MATLAB's cells
+        lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
+        texts = [each.strip("[], \t") for each in lines]
     else:
-        lines = [each.strip() for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-        flat = re.search(
-            r"dh(?:_?(?:param\w*|table|matrix))?(?:\[\d*\])?[\"']?\s*[:=]\s*$", group.before, re.I
-        )  # its rows are its lines
-        lists = ";" not in group.inside and not flat and any(each.endswith(",") for each in lines[:-1])
-        matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
-        texts = [] if lists or not matrix else [each.strip("[],") for each in lines]
+        texts = []
     grid, place = Grid(), group.start
     for text in texts:
         place = code.text.index(text, place)
@@ -176,6 +180,9 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     )
     if not in_table or not group.inside.strip():
         return
+    used = {*re.findall(rf"\b{name}[\[(]\d+,\s*:", code.text)}
+    if is_matrix and 0 < len(used) < len(_rows(code, group)):
+        code.refuse(group.start, name, "has rows that the program does not use", "Leave them out")
     changes = [found for found in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(found, name)]
     for change in [*_MOVED.finditer(group.before), *changes]:
         place = change.end() if change in changes else group.start
@@ -219,23 +226,24 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
-        order, toolbox = code.orders.get(named[2], []), _TOOLBOX.fullmatch(named[2])
-        cells = _arguments(named[2], each.inside) or _of_signature(order, each.inside)
+        target, function = named.groups()
+        order, toolbox = code.orders.get(function, []), _TOOLBOX.fullmatch(function)
+        cells = _arguments(function, each.inside) or _of_signature(order, each.inside)
         plainly = not {"direction", "prismatic"} & {*cells, *cells.values()}
-        if cells and plainly and (toolbox or named[2] == "DH") and _from_lists(code, cells):
+        if cells and plainly and (toolbox or function == "DH") and _from_lists(code, cells):
             _check_taken(code, each, cells)
             runs.append(each)
         elif cells and (toolbox or _says_numbers(code, cells)):
-            target = re.sub(r"\s", "", named[1] or "")
+            target = re.sub(r"\s", "", target or "")
             if target.isidentifier() and "type" not in cells:
                 target = ""
             added = re.search(
                 r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", each.before, re.S
             )
-            if added and named[1] is None:
+            if added:
                 target = f"{added[1]}[{each.start}"
             rows.append(_Link(target, each.start, cells))
-        elif not cells and toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
+        elif toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
             unread.append(each)
     if "Frame::DH(" in code.text:
         _segments(code, rows, runs)
@@ -243,13 +251,12 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
         code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
-    looped = re.search(r"\bfor\b", code.text) and len(rows) == 1
-    if len(rows) > records and (re.search(_ADDED, code.text) or looped or runs):
+    if len(rows) > records and (re.search(_ADDED, code.text) or len(rows) == 1 or runs):
         code.refuse(rows[0].place, ", ".join(texts), *_OF_LOOP)
     names = {row.name: row for row in rows}
-    chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in code.groups if each.bracket == "["]
-    arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
-    held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups if each.bracket in "[{"]
+    chosen = [row_cells(each.inside) for each in code.groups if each.bracket == "["]
+    arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
+    held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
     held = [each for each in held if len(each) > 1]
     taken = [row for each in arms for row in each]
     held = [each for one in held or [rows] for each in _begun_again(one)]
@@ -310,21 +317,18 @@ def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
     used = [int(found[2]) for each in runs for found in list(_ELEMENT.finditer(each.inside))[-1:] if found[2].isdigit()]
     one_by_one = used in (list(range(rows)), list(range(1, rows + 1))) and len(runs) == rows
     given = {name for name, part in _given_to(code, toolbox=True) if part != "0"}
-    left_out = not given & {"offset", "theta", "row"} and any(map(_turns, grids))  # offsets that no link takes
+    turns = (
+        cell
+        for (_, header), *body in grids
+        for _, cells in body
+        for name, cell in zip(header, cells)
+        if _place(name) == "theta"
+    )
+    # offsets that no link takes
+    left_out = not given & {"offset", "theta", "row"} and re.search(r"[1-9]|pi|π", " ".join(turns), re.I)
     if grids and not left_out and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
         return
     code.refuse(runs[0].start, runs[0].inside, *_OF_LOOP)
-
-
-def _turns(grid: Grid) -> bool:
-    """Whether a table has angles theta, or offsets, that are not 0."""
-    cells = [
-        cell
-        for name, column in zip(grid[0][1], zip(*(cells for _, cells in grid[1:])))
-        if heading_of(name) and _place(name) == "theta"
-        for cell in column
-    ]
-    return bool(re.search(r"[1-9]|pi|π", " ".join(cells), re.I))
 
 
 def _goes_through(code: Code, call: CodeGroup, rows: int) -> bool:
@@ -360,6 +364,10 @@ def _segments(code: Code, rows: list[_Link], runs: list[CodeGroup]) -> None:
 _KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
 
 
+_OF_ROWS = re.compile(r"\w*(?:dh|denavit|link|trans|frame)\w*|[AT]", re.I)
+"""Names of functions of a row, whose order a comment may say."""
+
+
 def _signatures(code: Code) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
@@ -368,6 +376,9 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         alike = sorted(map(_place, quantities_of(names))) == ["a", "alpha", "d", "theta"]
+        if not alike and named and each.bracket == "(" and _OF_ROWS.fullmatch(named[1]) and len(names) == 4:
+            names = code.order_near(code.line(each.start), code.line(each.start), 4)
+            alike = bool(names)
         if alike and named and each.bracket != "{":
             made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
             orders.setdefault(made[-1] if made else "", names)
@@ -409,13 +420,11 @@ class _Link:
 
 def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
     """Links by the arms that they belong to: a name that is used again begins another arm, another list does too."""
-    arms: list[list[_Link]] = [[]]
-    for row in rows:
-        last = arms[-1]
-        if last and (row.name in {other.name for other in last} - {""} or _list_of(row) != _list_of(last[-1])):
-            arms.append([])
-        arms[-1].append(row)
-    return arms
+    arms: dict[tuple[str, int], list[_Link]] = {}
+    for k, row in enumerate(rows):
+        uses = [other.name for other in rows[:k] if row.name].count(row.name)
+        arms.setdefault((_list_of(row), uses), []).append(row)
+    return [*arms.values()]
 
 
 def _list_of(row: _Link) -> str:
@@ -437,7 +446,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
             cells[pending], pending = part, ""
         elif quoted and _FLAGS.fullmatch(quoted[1]):
             words.append(quoted[1].lower())
-        elif quoted and toolbox:
+        elif quoted:
             pending = _argument(quoted[1])
         elif part:
             given.append(part)
@@ -476,8 +485,8 @@ def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[
     offset = cells.pop("offset", "0")
     row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
     row |= {"offset": "" if slides else offset, "type": "prismatic" if slides else "revolute"}
-    if slides and offset != "0":
-        row["d"] = f"{row['d']}+{offset}"
+    if slides:
+        row["d"] = offset  # its own d is no part of the transform
     row["convention"] = "modified" if re.search("mod|mdh", said) else "standard"
     return row | {"direction": "-1"} if "flip" in words else row
 
@@ -509,14 +518,16 @@ def _records(code: Code) -> list[Grid]:
         found = re.fullmatch(r"(\s*)(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
         if found is None:
             continue
-        key, rows = found[3].lower(), tables[-1]
-        if len(found[1]) < level and not found[4] and not re.search(r"\d", key):  # the name of another list
+        indent, dash, key, value = found.groups()
+        key, rows = key.lower(), tables[-1]
+        numbered = re.search(r"\d", key)
+        if len(indent) < level and not value and not numbered:  # the name of another list
             tables.append([(number, {})])
-        elif found[2] or key in rows[-1][1] or not found[4]:
-            rows.append((number, {"joint": key} if not found[4] and re.search(r"\d", key) else {}))
-            level = len(found[1])
-        if found[4]:
-            rows[-1][1][key] = found[4].strip(" \"'")
+        elif dash or key in rows[-1][1] or not value:
+            rows.append((number, {"joint": key} if not value and numbered else {}))
+            level = len(indent)
+        if value:
+            rows[-1][1][key] = value.strip(" \"'")
     full = [[row for row in rows if _is_row(row[1])] for rows in tables]
     return [_grid(rows) for rows in full if len(rows) > 1]
 
@@ -556,7 +567,7 @@ def _listed(code: Code) -> Grid:
         )
         if label and label[2] and label[2] not in stacked and "dh" not in label[2].lower():
             continue
-        if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
+        if label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
             alike = len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= 8
             if alike and all(re.search(r"\d|pi|π", cell) for cell in cells):
@@ -584,17 +595,16 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
     of a library."""
     width = len(rows[0][1])
-    lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
     typed = [
-        names
+        ",".join(names)
         for name, names in code.orders.items()
         if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
         or (name in code.fields and re.search(rf"\b{name}\b", before))
     ]
-    near = next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
+    near = code.order_near(rows[-1][0] + 1, rows[0][0], width)
     used = _columns_in(
         [
-            *map(",".join, typed),
+            *typed,
             *_UNPACKED.findall(code.text),
             *_ENUM.findall(code.text),
             *_LISTED.findall(code.text),
@@ -610,12 +620,12 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     taken = (
         order.split(",") for library, (order, _) in LIBRARIES.items() if re.search(library, code.text) and width >= 4
     )
-    return next((names[:width] for names in taken if len(names) >= width), [])
+    return next((names[:width] for names in taken), [])
 
 
 def _place(name: str) -> str:
     """What a column is, whether theta or its offset."""
-    return quantities_of([name])[0].replace("offset", "theta")
+    return next(iter(quantities_of([name])), name).replace("offset", "theta")
 
 
 def _columns_in(texts: Iterable[str], width: int) -> list[str]:
@@ -623,8 +633,9 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     found: dict[str, list[str]] = {}
     for text in texts:
         text = re.sub(r"(?<=,)(\s*)_(?=,|$)", r"\1theta", re.sub(r"\b(?:joint_?)?type\b", "sigma", text))
-        text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
-        words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text) if word]
+        text = re.sub(r"(?<=\w)\s*[({_]*\s*i\s*-\s*1\s*[)}]*", "_i-1", text)
+        text = re.sub(r"(?<=\w)(?:\s*\(\s*i\s*\)|\s+i(?=\s*,|$))", "_i", text)
+        words = re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text)
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
         # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
         names = next((each for each in windows if _names_columns(each, once=len(each) > width)), [])
@@ -682,7 +693,7 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
         name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[\d*\]\w+)?[\"']?$",
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\]|\(1:\w+\))?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[\d*\]\w+)?[\"']?$",
             group.before,
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
@@ -707,70 +718,73 @@ def _vectors(code: Code) -> list[Grid]:
 
 def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str, str]) -> list[Grid]:
     """The columns of a table by the names of their lists, or as links take them."""
-    named: dict[str, list[str]] = {}
-    header, line, places = dict[str, str](), 0, dict[str, tuple[int, str]]()
+    columns: dict[str, tuple[str, list[str], int, str]] = {}  # heading, cells, line, the list's name
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
         names = (taken.get(name, "-"),) if taken else (name, bare, bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
-        if heading and heading.quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
-            continue  # values of joints, or their limits
         quantity = heading.quantity if heading else name
-        if quantity == "theta" and mark == "=":
-            text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
-            if not re.search(r"[^\W\d]", text):
-                quantity = "pose" if name != "q" and re.search("[1-9]", text) else ""
-        if quantity == "a" and re.search(r"(?<![a-z])pi(?![a-z])|π|2rad|radians", " ".join(cells), re.I):
-            quantity = "alpha"
-        of_others = name in "Ll" and "a" in named and places["a"][1] not in "rR"
+        if quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
+            continue  # values of joints, or their limits
+        text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b|π|2rad|radians", "π", " ".join(cells), flags=re.I)
+        if quantity == "theta" and mark == "=" and not re.search(r"[^\W\dπ]", text):
+            quantity = "pose" if name != "q" and re.search("[1-9π]", text) else ""
+        quantity = "alpha" if quantity == "a" and "π" in text else quantity
+        of_others = name in "Ll" and columns.get("a", "r")[-1] not in "rR"
         if quantity not in _OF_VECTORS or not cells or of_others:
             continue
-        header[quantity] = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
-        places.setdefault(quantity, (line, name))
-        if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
-            problem = (
-                f"'{name}' is another list of {quantity} than '{places[quantity][1]}' of line {places[quantity][0]}"
-            )
+        title = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
+        _, first, place, other = columns.setdefault(quantity, (title, cells, line, name))
+        if first != cells and quantity not in ("theta", "pose"):
+            problem = f"'{name}' is another list of {quantity} than '{other}' of line {place}"
             raise InputError(None, f"line {line}", problem, "Give the lists of one arm, each with its own name")
-    if not {"a", "alpha", "d"} <= {*named}:
+    if not {"a", "alpha", "d"} <= {*columns}:
         return []
-    if named.pop("pose", None) and "theta" not in named:
-        line, name = places["pose"]
+    *_, place, name = columns.pop("pose", ("", 0, ""))
+    if name and "theta" not in columns:
+        problem = f"'{name}' may be offsets of the joints' angles, or a pose"
+        raise InputError(None, f"line {place}", problem, "Name it offset if theta = q + offset, or remove it")
+    titles, lengths, places, _ = zip(*columns.values())
+    if len({*map(len, lengths)}) > 1:
+        entries = ", ".join(f"{name} {len(cells)}" for name, (_, cells, _, _) in columns.items())
         raise InputError(
-            None,
-            f"line {line}",
-            f"'{name}' may be offsets of the joints' angles, or a pose",
-            "Name it offset if theta = q + offset, or remove it",
+            None, f"line {max(places)}", f"different numbers of entries: {entries}", "Give one for each joint"
         )
-    if len({len(cells) for cells in named.values()}) > 1:
-        problem = f"different numbers of entries: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
-        raise InputError(None, f"line {line}", problem, "Give one for each joint")
-    return [[(0, [header[name] for name in named]), *((1, list(row)) for row in zip(*named.values()))]]
+    return [[(0, [*titles]), *((1, list(row)) for row in zip(*lengths))]]
 
 
+_USED = re.compile(
+    r"[\[(,;]\s*-?(?:al(?:p|ph|f)a?)[_({\[]*\d[)}\]]*+\s*[,;\])]|\b(?:q|th(?:eta)?)_?[\[({]?\d[\])}]?\s*[-+]\s*(?:\d|\w*\.?pi\b)",
+    re.I,
+)
+"""Symbols that are entries of a matrix, or a sum with a joint's variable."""
 _OF_VECTORS = words_of("a alpha d theta offset type direction pose")
 
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
-    name = r"(?<![\"'\w])(?:DH_)?(al(?:ph|f)a|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)_?(\d{1,2})\s*([:=])"
-    pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s](?:::|[^,}}\n;:=!])*)"
-    found: dict[str, dict[int, re.Match[str]]] = {}
-    for each in re.finditer(
-        pattern, re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I
-    ):
-        found.setdefault(each[1].lower(), {}).setdefault(int(each[2]), each)
-    if not {*quantities_of(found)} >= {"alpha", "a", "d"} or (len(found) == 3 and "DH_A" not in code.text):
-        return  # they may be in a matrix of these symbols
+    name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)"
+    name += r"[_({\[]*(\d{1,2})[)}\]]*(?(1)\1)"
+    pattern = rf"{name}\s*([:=])(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s\[{{](?:::|[^,}}\n;:=!])*)"
+    found: dict[str, dict[int, tuple[str, str, int]]] = {}  # value, mark and place of each number
+    text = re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text)
+    for each in re.finditer(pattern, text, re.I):
+        _, name, number, mark, value = each.groups()
+        found.setdefault(name.lower(), {}).setdefault(int(number), (value.strip(), mark, each.start()))
+    quantities = dict(zip(quantities_of(found), found.values()))
+    if not quantities.keys() >= {"alpha", "a", "d"}:
+        return
+    if len(found) == 3 and "DH_A" not in code.text and (used := _USED.search(code.text)):
+        code.refuse(used.start(), used[0], "is no column of a table", "Write a list of theta or offset")
     for name, entries in found.items():
-        last, cells = entries[max(entries)], {k: each[4].strip() for k, each in entries.items()}
-        of_link = found["alpha" if name in ("alpha", "a") else "d"]
+        cells = {k: value for k, (value, _, _) in entries.items()}
+        _, mark, place = entries[max(entries)]
+        of_link = quantities["alpha" if _place(name) in ("alpha", "a") else "d"]
         first = min(entries) if len(entries) == len(of_link) else min(of_link)
         gaps = {*range(first, max(entries) + 1)} - {*entries}
-        if gaps and last[3] == ":" and _place(name) == "theta":  # what is not replaced stays a variable
-            cells |= {k: f"{name}{k}" for k in gaps}
-        elif gaps:
-            code.refuse(last.start(), f"{name}{min(gaps)}", "is missing", "Give one for each joint")
-        before = "(i-1)" if min(of_link) < max(min(each) for each in found.values()) else ""
-        yield name + before, [cells[k] for k in sorted(cells)], code.line(last.start()), last[3]
+        if gaps and (mark != ":" or _place(name) != "theta"):
+            code.refuse(place, f"{name}{min(gaps)}", "is missing", "Give one for each joint")
+        cells |= {k: f"{name}{k}" for k in gaps}  # what is not replaced stays a variable
+        before = "(i-1)" if min(of_link) < max(map(min, found.values())) else ""
+        yield name + before, [cells[k] for k in sorted(cells)], code.line(place), mark

@@ -15,8 +15,9 @@ _JOINT = words_of(
     "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
-    "a=a r=a l=a d=d q=theta v=theta phi=theta φ=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha "
-    "alph=alpha al=alpha offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset th0=offset "
+    "a=a r=a l=a d=d q=theta v=theta phi=theta φ=theta th=theta teta=theta tetha=theta thetha=theta "
+    "alf=alpha alfa=alpha alp=alpha alph=alpha al=alpha offset=offset offsets=offset relativeoffset=offset "
+    "theta0=offset θ0=offset th0=offset "
     "θoff=offset thoff=offset thetaoff=offset type=type jointtype=type sigma=type σ=type 类型=type"
 )
 _WORDS = words_of(
@@ -31,6 +32,7 @@ _PRIVATE = re.compile(r"type|convention|direction|calibrated|(?:lower|upper|spee
 _OF_RANGES = re.compile(r"(?i)(?<![a-z])(?:min|max|range|limit)|范围|限")
 _LETTER = re.compile(r"[^\W\d_]|#")
 _LAST_WORD = re.compile(r".*\s([^\s(\[\]]+)\s*(?:[(\[]\D*)?")
+_UNIT = re.compile(r"(?:[(\[/,]|(?<=[a-zα-ω])_(?=(?:mm|cm|m|in|deg|rad)$))([^()\[\]/,]+)")
 _BEFORE = re.compile(r"[ijn]-1")
 
 
@@ -63,8 +65,7 @@ def heading_of(text: str) -> Heading | None:
     if _PRIVATE.fullmatch(text) or len(text) > 60 or not _LETTER.search(text) or _OF_RANGES.search(text):
         return None
     short = re.sub(r"<[^>]*>|[\s{}\\\"'`$^]", "", plain(text).lower())
-    said = [each for each in re.findall(r"[(\[/,]([^()\[\]/,]+)", short) if each in UNITS]
-    said += [found[1] for found in [re.search(r"[a-zα-ω]_(mm|cm|m|in|deg|rad)$", short)] if found]
+    said = [each for each in _UNIT.findall(short) if each in UNITS]
     unit = said[0] if said == ["grad"] else UNITS[said[0]] if said else ""
     name = re.sub(r"_(mm|cm|m|in|deg|rad)$", "", short)
     # Without the index, which says only whether the entry belongs to the joint or to the link before it.
@@ -72,10 +73,13 @@ def heading_of(text: str) -> Heading | None:
     name = re.sub(r"_?[ijn]-1$|(?<=.)_?[ijn]$|\*$|_k$|:$", "", name).replace("_", "")
     if name in _JOINT:
         return Heading("joint", "", False)
-    marked = _NAMES.get(name) or next((quantity for mark, quantity in _WORDS.items() if mark in name), None)
-    marked = marked or _NAMES.get(re.sub(r"[^a-z]", "", name) if not name.isascii() else "")
     last = _LAST_WORD.fullmatch(plain(text.lower()))
-    marked = marked or (last and _NAMES.get(last[1]))
+    marked = (
+        _NAMES.get(name)
+        or next((quantity for mark, quantity in _WORDS.items() if mark in name), None)
+        or _NAMES.get(re.sub(r"[^a-z]", "", name) if not name.isascii() else "")
+        or (last and _NAMES.get(last[1]))
+    )
     return Heading(marked, unit, bool(_BEFORE.search(short)), name) if marked else None
 
 

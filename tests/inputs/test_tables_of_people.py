@@ -842,6 +842,20 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "float a_[2] = {0, 270};\nfloat alpha_[2] = {-90, 0};\nfloat d_[2] = {290, 0};\nfloat th0_[2] = {0, -90};\n",
         "| i | α (°) | a (mm) | d (mm) | θ | θ 零位偏移 (°) |\n|--|--|--|--|--|--|\n"
         "| 1 | -90 | 0 | 290 | θ1 | 0 (朝前) |\n| 2 | 0 | 270 | 0 | θ2 | -90 (竖直) |\n",
+        "alpha(1)=-pi/2; a(1)=0; d(1)=290; offset(1)=0;\nalpha(2)=0; a(2)=270; d(2)=0; offset(2)=-pi/2;\nq1=[-9, 9]/2;\n",
+        "q1, q2, q3 = symbols('q1:4')\nDH = {'alpha1': -pi/2, 'a1': 0, 'd1': 290,\n"
+        "      'alpha2': 0, 'a2': 270, 'd2': 0, q2: -pi/2 + q2}\n",
+        "numLinks 2\nlink_0 (offset 0.0) (D 290) (A 0.0) (alpha -90.0) (mass 1) (cog 0 0 0)\n"
+        "link_1 (offset -90.0) (D 0.0) (A 270) (alpha 0.0) (mass 2) (cog 0 0 0)\n",
+        "# theta, d, a, alpha\nT1 = dh(q[0], 290, 0, -pi/2)\nT2 = dh(q[1] - pi/2, 0, 270, 0)\nplot(-1, 1, -1, 1)\n",
+        "rows = np.array([\n  # alpha i - 1, a i - 1, d i, theta i\n  # [0.0, 0.0, 0.0, q1],\n"
+        "  [-pi / 2, 0.0, 290, q1],\n  [0.0, 270, 0.0, q2 - pi/2]])\n",
+        "% alpha, a, d\nM = [-pi/2 0 290;\n 0 270 0];\ntheta_offset = [0 -pi/2];\nq = [1 2];\n",
+        "| i | alpha | a | d | offset |\n|--|--|--|--|--|\n| 1 | -pi/2 | 0 | 290 | 0 |\n| 2 | 0 | a2 | 0 | T2\\_offset |\n\n"
+        "a2 = sqrt(162^2 + 216^2) = 270;\n\nT2\\_offset = -atan(1e9) = -1.5707963 (-90°);\n",
+        "alpha(1:2) = [-pi/2, 0];\na(1:2) = [0, 270];\nd(1:2) = [290, 0];\noffset(1:2) = [0, -pi/2];\n",
+        "const d2 = parseFloat(input.value);\nrows = [{theta: q1, d: 290, a: 0, alpha: -PI / 2},\n"
+        "{theta: q2 - PI / 2, d: 0, a: 270, alpha: 0}]\n",
     ],
 )
 def test_names_and_places_that_programs_give_a_table_are_read(tmp_path, text):
@@ -862,6 +876,42 @@ def test_a_convention_by_which_two_joints_turn_about_one_line_is_asked_back(tmp_
     assert read(tmp_path, "Modified DH\n" + CRAIG)[0].dh.convention == "modified"
     # As modified rows joints 3 and 4 would turn about one line, too: nothing to choose between.
     assert read(tmp_path, CRAIG.replace("4,-82,90", "4,0,0"))[0].dh.convention == "standard"
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        (  # a program beside the table of another arm
+            "L1=Link([0 0.29 0 -pi/2]);\nL2=Link([0 0 0.27 0]);\n\n|i|θ|d|a|α|\n|--|--|--|--|--|\n|1|θ1|0|0|-90|\n"
+            "|2|θ2|149mm|-20mm|90|\n",
+            "2 D-H tables, at lines 1 and 4",
+        ),
+        (
+            "M = [0 0 0.3 0;\n 0.2 0 0 0;\n 0.1 0 0 0];\nsetFixedTransform(j1, M(1,:), 'dh');\n"
+            "setFixedTransform(j2, M(2,:), 'dh');\n",
+            "rows that the program does not use",
+        ),
+        (
+            "a1 = 0; alpha1 = -pi/2; d1 = 1;\na2 = 1; alpha2 = 0; d2 = 0;\nT = f(a1, alpha1, d1, q1-pi/2);",
+            "is no column",
+        ),
+        ("# alpha, a, d\nM = [[1, 0, 1], [0, 1, 0]]\ntheta_offset = [0, 1]\nq = q - theta_offset\n", "may be offsets"),
+    ],
+)
+def test_what_a_program_leaves_out_or_a_document_says_twice_is_asked_back(tmp_path, text, names):
+    with pytest.raises(InputError, match=names):
+        read(tmp_path, text)
+
+
+def test_a_table_said_twice_alike_is_read(tmp_path):
+    text = "L1=Link([0 0.29 0 -pi/2]);\nL2=Link([0 0 0.27 0]);\n\n|i|θ|d|a|α|\n|--|--|--|--|--|\n|1|θ1|290|0|-90|\n"
+    content, _ = read(tmp_path, text + "|2|θ2|0|270|0|\n")
+    assert [row.d_mm for row in content.dh.rows] == pytest.approx([290, 0])
+
+
+def test_a_joint_of_a_toolbox_that_slides_has_no_d_of_its_own(tmp_path):
+    content, _ = read(tmp_path, "L(1) = Link([0, 0, 0.3, 0, 0]);\nL(2) = Link([0, 0.7, 0, pi/2, 1]);\n")
+    assert [(row.type, row.d_mm) for row in content.dh.rows] == [("revolute", 0), ("prismatic", 0)]
 
 
 def test_lists_d_and_r_as_khalil_names_them_are_asked_back(tmp_path):
