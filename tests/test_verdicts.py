@@ -15,9 +15,12 @@ from lxml import etree
 
 from er3a.errors import InputError, ResultError
 from er3a.files.kept_files import shown_path
+from er3a.finding import fact
+from er3a.pipeline import verdicts
 from er3a.pipeline.overview.index import write_index
-from er3a.pipeline.results import write_checksum
+from er3a.pipeline.results import Summary, Verdict, write_checksum
 from er3a.pipeline.run_study import run_study
+from er3a.pipeline.scope import GAPS, Coverage, Open
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -165,6 +168,32 @@ def study():
     content = yaml.safe_load((ROOT / "config/small.yaml").read_text(encoding="utf-8"))
     content["robots"] = {"er3_600": {key: content["robots"]["er3_600"][key] for key in ("targets", "paths")}}
     return Study.model_validate(content)
+
+
+@pytest.mark.parametrize("expect", [{}, {"workspace": "caution"}])
+def test_what_several_stages_do_not_cover_is_one_caution(study, monkeypatch, expect):
+    """One that finds more itself, or of which the first was expected, is a caution all the same."""
+    limits, path = Open("limits_assumed", ("j1",)), Open("not_followed", ("line",))
+    gaps = {"workspace": [limits], "collision": [limits], "inverse": [limits], "trajectory": [limits, path]}
+
+    def scope(_, stage):
+        verdict = Verdict("caution" if stage.name == "collision" else "pass", fact("not_checked", checks=()))
+        covered = [Coverage(GAPS[each.reason], 0, 6, (each,)) for each in gaps.get(stage.name, ())]
+        summary = Summary(verdict, (), checked=tuple(covered))
+        return replace(summary, figures=())  # made anew, as when it is read from its file
+
+    study.robots["er3_600"].expect.update(expect)
+    monkeypatch.setattr(verdicts, "is_computed", lambda folder: True)
+    monkeypatch.setattr(verdicts, "changed_since", lambda *of: ())
+    monkeypatch.setattr(verdicts, "read_scope", scope)
+    found = {each.stage: each for each in read_verdicts(study, Path())}
+    assert [each.status for each in found.values()] == ["pass", *["caution"] * 4, "pass"]
+    first = "collision" if expect else "workspace"
+    assert {stage for stage, each in found.items() if each.counts("caution")} == {first, "collision", "trajectory"}
+    assert {stage: each.said_by for stage, each in found.items() if each.said_by} == {"inverse": first}
+    assert [stage for stage, each in found.items() if "j1" in each.text] == list(dict.fromkeys(["workspace", first]))
+    assert all(found[stage].text.count(f"as above ({first})") == 1 for stage in ("inverse", "trajectory"))
+    assert "line" in found["trajectory"].text
 
 
 @pytest.mark.long

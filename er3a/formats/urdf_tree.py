@@ -1015,13 +1015,12 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
         names ``path`` for what the expanded file is refused for, too
     """
     text = COMMENT.sub("", read_text(path, MAX_BYTES))
-    if not MACRO.search(text) and not ("<xacro:" in text and EXPRESSION.search(text)):
+    if not (MACRO.search(text) or ("xacro" in text and EXPRESSION.search(text))):
         if arguments:
             raise InputError(path, "--xacro", "the file holds no xacro macros", "Leave the arguments out")
         yield path
         return
-    values = dict(_argument(path, each) for each in arguments)
-    expanded = _expanded(path, values)
+    expanded = _expanded(path, dict(_argument(path, each) for each in arguments))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, f"{robot_name(Path(named[1] if (named := NAMED.search(expanded)) else path.stem))}.urdf")
         file.write_text(expanded, encoding="utf-8")

@@ -42,7 +42,7 @@ FORMAT_VERSION = 12
 """Of results as they are stored. Rises, at the latest before a release, if a field or column of an earlier release
 goes, or gets another name, unit or meaning. What is only added does not raise it: changed code computes results again.
 """
-BESIDE = ("shapes", "missed")
+BESIDE = ("shapes", "missed", "lowered")
 """What a verdict can have beside its finding."""
 THE_SETTINGS = N_("the study's settings")
 THE_CODE = N_("er3a itself")
@@ -58,12 +58,14 @@ class Verdict:
     """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found.
 
     ``shapes``: on what assumed shapes of the arm it rests. ``missed``: the checks that do not cover all that was asked.
+    ``lowered``: whether it would pass but for these.
     """
 
     status: Status
     finding: Finding
     shapes: Finding | None = None
     missed: tuple[Coverage, ...] = ()
+    lowered: bool = False
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -83,7 +85,9 @@ class Verdict:
         -------
         verdict : a caution in place of a pass, if there are any
         """
-        return self._lowered(bool(missed), missed=missed)
+        if missed and self.status == "pass":
+            return replace(self, status="caution", missed=missed, lowered=True)
+        return replace(self, missed=missed)
 
     def with_assumed_shapes(self, shapes: Finding | None) -> Verdict:
         """The verdict where shapes of the arm are assumed.
@@ -96,10 +100,8 @@ class Verdict:
         -------
         verdict : a caution in place of a pass, if anything comes too near
         """
-        return self._lowered(bool(shapes and shapes.near), shapes=shapes)
-
-    def _lowered(self, doubtful: bool, **beside: Any) -> Verdict:
-        return replace(self, status="caution" if doubtful and self.status == "pass" else self.status, **beside)
+        near = shapes and shapes.near and self.status == "pass"
+        return replace(self, status="caution" if near else self.status, shapes=shapes)
 
 
 @dataclass(frozen=True)
@@ -554,13 +556,11 @@ def _stored_finding(verdict: Mapping[str, Any]) -> dict[str, Any]:
 
 def _parsed(path: Path, stored: dict[str, Any], kind: type[Results]) -> tuple[Any, Provenance]:
     own = {key: value for key, value in stored.items() if key not in ("format_version", "robot", "stage", "provenance")}
-    verdict = own.get("verdict")
+    verdict = own["verdict"]
     of_stage: Any = get_type_hints(kind)["summary"]
+    more = {key: verdict[key] for key in BESIDE if key in verdict}
+    own["verdict"] = {"status": verdict["status"], "finding": _stored_finding(verdict), **more}
     try:
-        if isinstance(verdict, dict):
-            finding = _stored_finding(verdict)
-            more = {key: verdict[key] for key in BESIDE if key in verdict}
-            own["verdict"] = {"status": verdict["status"], "finding": finding, **more}
         return adapter(of_stage).validate_python(own), adapter(Provenance).validate_python(stored.get("provenance"))
     except ValidationError as error:
         first = error.errors()[0]

@@ -16,7 +16,7 @@ import shutil
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stderr, suppress
 from dataclasses import dataclass
 from io import StringIO
@@ -46,20 +46,20 @@ def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path
     These are results, pages, recordings and their pictures. Of a stage's results it is the summary that is named,
     without which the stage counts as not done.
     """
-    checks: list[tuple[Path, Callable[[Path], object]]] = [
-        (reports / page, check_checksum) for page in (*OVERALL, *study.article_pages().values())
-    ]
+    files = [reports / page for page in (*OVERALL, *study.article_pages().values())]
     for robot in study.names:
-        checks += [(reports / robot / f"{page}.html", check_checksum) for page in study.pages(robot)]
+        files += [reports / robot / f"{page}.html" for page in study.pages(robot)]
         for stage in study.stages(robot):
-            checks.append((results / robot / stage / "summary.json", lambda path: check_results(path.parent)))
-            checks += [(reports / robot / f"{stage}.{kind}", check_checksum) for kind in ("rrd", "webp")]
-    for path, check in checks:
-        if path.is_file():
-            try:
-                check(path)
-            except ResultError as error:
-                yield path, error
+            files.append(results / robot / stage / SUMMARY)
+            files += [reports / robot / f"{stage}.{kind}" for kind in ("rrd", "webp")]
+    for path in filter(Path.is_file, files):
+        try:
+            if path.name == SUMMARY:
+                check_results(path.parent)
+            else:
+                check_checksum(path)
+        except ResultError as error:
+            yield path, error
 
 
 SIGKILL = 9

@@ -9,8 +9,8 @@ summary's ``assumed``: it lowers no verdict, and is said once.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Check = Literal[
@@ -129,23 +129,20 @@ def coverages(asked: Mapping[Check, int | tuple[int, int]], gaps: Iterable[Open]
     return tuple(checked)
 
 
-def uncovered(checked: Iterable[Coverage], gaps: Iterable[Open]) -> tuple[Coverage, ...]:
+def uncovered(checked: Sequence[Coverage], gaps: Sequence[Open]) -> tuple[Coverage, ...]:
     """What checks cover when it turns out that some cover nothing.
 
     Parameters
     ----------
     checked : of a stage
-    gaps : why; those of checks that the stage does not make do not count
+    gaps : why, all of one check; they do not count where the stage does not make it
 
     Returns
     -------
     checked : in the same order
     """
-    of: dict[Check, tuple[Open, ...]] = {}
-    for gap in gaps:
-        of[GAPS[gap.reason]] = (*of.get(GAPS[gap.reason], ()), gap)
     return tuple(
-        Coverage(each.check, 0, each.of, (*each.gaps, *of[each.check])) if each.check in of else each
+        replace(each, covered=0, gaps=(*each.gaps, *gaps)) if gaps and each.check == GAPS[gaps[0].reason] else each
         for each in checked
     )
 

@@ -526,11 +526,13 @@ def shapes_named_in(path: Path) -> list[Path]:
     """
 
     def named(part: Any) -> Iterator[Path]:
-        if isinstance(part, dict) and isinstance(part.get("mesh"), str):
-            yield own_or_shipped(part["mesh"])
-        if isinstance(part, dict) and isinstance(part.get("stl"), str):
-            yield path.parent / part["stl"]
-        for inner in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
+        if isinstance(part, dict):
+            if isinstance(part.get("mesh"), str):
+                yield own_or_shipped(part["mesh"])
+            if isinstance(part.get("stl"), str):
+                yield path.parent / part["stl"]
+            part = [*part.values()]
+        for inner in part if isinstance(part, list) else ():
             yield from named(inner)
 
     try:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
@@ -19,13 +19,12 @@ from er3a.pipeline import language
 from er3a.pipeline.messages.say import joined, say_all, sentence
 from er3a.pipeline.messages.scope import assumed_text, covered_text, missed_text
 from er3a.pipeline.results import Status, changed_since, is_computed, read_scope, read_status
-from er3a.pipeline.scope import Coverage
+from er3a.pipeline.scope import Coverage, Open
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 
 Level = Literal["caution", "fail"]
 NOT_EXAMINED: Literal["not_examined"] = "not_examined"
-_COUNTED: dict[Level, tuple[Status, ...]] = {"caution": ("caution", "fail"), "fail": ("fail",)}
 
 
 @dataclass(frozen=True)
@@ -41,6 +40,7 @@ class StageVerdict:
     checked : what each check covers; not_checked : why not all, in English; assumed : what they rest on, in English
     outdated : files that have changed since, "the study's settings" or "er3a itself": the verdict is none on what they
         are now
+    said_by : the robot's stage whose caution names already all that keeps this one from a pass; empty if there is none
     """
 
     robot: str
@@ -54,6 +54,13 @@ class StageVerdict:
     not_checked: tuple[str, ...] = ()
     assumed: tuple[str, ...] = ()
     outdated: tuple[str, ...] = ()
+    said_by: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The status in words, and whether it is as expected; of a caution that another stage explains, which one."""
+        status = f"see {self.said_by}" if self.said_by else self.status.replace("_", " ")
+        return status + ", as expected" * self.is_demonstration
 
     @property
     def is_demonstration(self) -> bool:
@@ -63,8 +70,7 @@ class StageVerdict:
     @property
     def is_otherwise(self) -> bool:
         """Whether the stage has come to another verdict than the study says that it is to come to."""
-        examined = self.status not in (NOT_EXAMINED, "not_computed")
-        return self.expected is not None and examined and self.status != self.expected
+        return self.status not in (NOT_EXAMINED, "not_computed") and self.expected not in (None, self.status)
 
     @property
     def broken(self) -> bool:
@@ -75,35 +81,41 @@ class StageVerdict:
     def is_skipped(self) -> bool:
         """Whether nothing was judged: not examined yet, no reference, or a stage that does not apply to the robot."""
         absent = self.status in (NOT_EXAMINED, "no_reference", "not_computed")
-        return absent and not self.broken and not self.is_otherwise
+        return absent and not (self.broken or self.is_otherwise)
 
     def counts(self, level: Level) -> bool:
         """Whether this is a finding at a level.
 
         A stage that broke is one at each, for it hides what it would say, and so is one that did not come to what the
-        study expects, or whose inputs have changed since; a demonstration is none.
+        study expects, or whose inputs have changed since; a demonstration is none, nor what another stage says for it.
         """
         if self.broken or self.is_otherwise or self.outdated:
             return True
-        return self.status in _COUNTED[level] and not self.is_demonstration
+        return self.status in (level, "fail") and not (self.is_demonstration or self.said_by)
 
 
 def read_verdicts(study: Study, results: Path) -> list[StageVerdict]:
     """The verdicts of all stages of all robots, in the study's order; those not computed yet are ``not_examined``.
+
+    Why checks do not cover all is said by the first caution of a robot that counts; the stages after it name that one.
 
     Raises
     ------
     ResultError
         results are damaged or of another format version, or no stage has any
     """
+    found: list[StageVerdict] = []
     with language.using("en"):
-        found = [_stage_verdict(study, results, robot, stage) for robot in study.names for stage in study.stages(robot)]
+        for robot in study.names:
+            said: dict[Open, Open] = {}
+            found += [_stage_verdict(study, results, robot, stage, said) for stage in study.stages(robot)]
     if all(verdict.status == NOT_EXAMINED for verdict in found):
         read_status(results / found[0].robot / found[0].stage)
     return found
 
 
-def _stage_verdict(study: Study, results: Path, robot: str, name: str) -> StageVerdict:
+def _stage_verdict(study: Study, results: Path, robot: str, name: str, said: dict[Open, Open]) -> StageVerdict:
+    """The verdict of a stage; ``said``, by gap the first stage that names it, gets those that this one adds."""
     folder, stage, expected = results / robot / name, STAGES[name], study.entry(robot).expect.get(name)
     if not is_computed(folder):
         unknown = sentence("stage.not_examined")
@@ -112,15 +124,20 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str) -> StageV
     summary = read_scope(folder, stage)
     verdict = summary.verdict
     shown = len(getattr(verdict.finding, "demonstrations", ()))
-    text = say_all(verdict.findings)
+    fresh = [gap for each in verdict.missed for gap in each.gaps or (None,) if gap not in said]
+    again = verdict.lowered and not fresh and said[verdict.missed[0].gaps[0]].names[0]
+    missed = tuple(
+        replace(each, gaps=tuple(dict.fromkeys(said.get(gap, gap) for gap in each.gaps))) for each in verdict.missed
+    )
+    if verdict.status == "caution" != expected:
+        said |= {gap: Open("as_above", (name,)) for gap in fresh if gap}
+    text = say_all(replace(verdict, missed=missed).findings)
     outdated = changed_since(folder, study, robot, name)
     if outdated:
         text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)
-    missed = tuple(missed_text(each) for each in summary.checked if not each.complete)
     return StageVerdict(
-        *(robot, name, verdict.status, verdict.finding.code, text, shown, expected, summary.checked, missed),
-        tuple(map(assumed_text, summary.assumed)),
-        outdated,
+        *(robot, name, verdict.status, verdict.finding.code, text, shown, expected, summary.checked),
+        *(tuple(map(missed_text, missed)), tuple(map(assumed_text, summary.assumed)), outdated, again or ""),
     )
 
 
@@ -176,7 +193,7 @@ def _add_case(suite: ElementTree.Element, verdict: StageVerdict) -> None:
     if verdict.is_demonstration:
         lines.append(f"demonstration, {verdict.status} as expected: {text}")
     elif verdict.status in ("pass", "caution"):
-        lines.append(f"{verdict.status}: {text}")
+        lines.append(f"{verdict.shown}: {text}")
     if verdict.demonstrations:
         lines.append(f"demonstrations, which fail as expected: {verdict.demonstrations}")
     if verdict.is_otherwise:

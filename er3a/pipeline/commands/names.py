@@ -17,91 +17,53 @@ ROBOT_FILES = "Robot files"
 PROGRAMS = "Robot programs"
 JOBS = "Single jobs, called by the workflow"
 
-COMMANDS = {
-    "new": (
-        "studies",
-        FIRST,
-        "Write a study for an arm: robot file, scene, targets and paths that the arm can do, README.",
-    ),
-    "check": (
-        "studies",
-        FIRST,
-        "Check input files: print the kind of each file, or its error; of a URDF also the rules that it breaks.",
-    ),
-    "run": ("studies", FIRST, "Run the study in this folder; finished parts are not run again."),
-    "verdicts": ("studies", FIRST, "Print the verdict of each stage of each robot."),
-    "view": (
-        "studies",
-        FIRST,
-        "Open the recordings in the Rerun viewer, or, without a desktop, serve them to a browser.",
-    ),
-    "compare": (
-        "compare_arms",
-        ROBOT_FILES,
-        "Do A and B describe the same arm? Lists the entries that differ. Without B: which known arm is A?",
-    ),
-    "arms": (
-        "known_arms",
-        ROBOT_FILES,
-        "List known arms by name, with maker, joints, reach and source. All commands take their names.",
-    ),
-    "confirm": (
-        "confirm",
-        ROBOT_FILES,
-        "Does the model agree with the controller? Compares joint values and poses as the pendant shows them.",
-    ),
-    "import-urdf": (
-        "robot_files",
-        ROBOT_FILES,
-        "Write a robot file (D-H table, directions, offsets, limits) from a URDF.",
-    ),
-    "export-urdf": ("robot_files", ROBOT_FILES, "Write a robot as URDF."),
-    "import-calibration": (
-        "robot_files",
-        ROBOT_FILES,
-        "Write a robot file from a factory calibration; huge d values that cancel become Hayati parameters.",
-    ),
-    "calibrate": (
-        "robot_files",
-        ROBOT_FILES,
-        "Estimate corrections to a robot's table, base and tool from measured positions; write the corrected robot "
-        "file.",
-    ),
-    "predict": (
-        "robot_files",
-        ROBOT_FILES,
-        "Print where a calibrated arm's tool is at commanded joint values, by the whole model with all its terms: a "
-        "CSV with position and roll, pitch and yaw.",
-    ),
-    "hand-eye": (
-        "robot_files",
-        ROBOT_FILES,
-        "Estimate the pose of a camera, with 95 % intervals; name samples and conventions that can't be right.",
-    ),
-    "teach": (
-        "single_jobs",
-        ROBOT_FILES,
-        "Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.",
-    ),
-    "check-program": (
-        "programs",
-        PROGRAMS,
-        "Check each motion of robot programs. Findings are lines: file:line: level: message \\[code].",
-    ),
-    "program": ("programs", PROGRAMS, "Write robot programs from paths."),
-    "compute": ("single_jobs", JOBS, "Compute a stage: tables and summary.json."),
-    "views": (
-        "single_jobs",
-        JOBS,
-        "Write a robot's recordings (always in English), a picture of each, and pages from results.",
-    ),
-    "index": ("single_jobs", JOBS, "Write the index."),
-    "article": (
-        "single_jobs",
-        JOBS,
-        "Write the page on the article from results; `er3a run --study config/article.yaml` also computes them.",
-    ),
+_GROUPS = {
+    ("studies", FIRST): {
+        "new": "Write a study for an arm: robot file, scene, targets and paths that the arm can do, README.",
+        "check": "Check input files: print the kind of each file, or its error; of a URDF also the "
+        "rules that it breaks.",
+        "run": "Run the study in this folder; finished parts are not run again.",
+        "verdicts": "Print the verdict of each stage of each robot.",
+        "view": "Open the recordings in the Rerun viewer, or, without a desktop, serve them to a browser.",
+    },
+    ("compare_arms", ROBOT_FILES): {
+        "compare": "Do A and B describe the same arm? Lists the entries that differ. Without B: which known arm is A?",
+    },
+    ("known_arms", ROBOT_FILES): {
+        "arms": "List known arms by name, with maker, joints, reach and source. All commands take their names.",
+    },
+    ("confirm", ROBOT_FILES): {
+        "confirm": "Does the model agree with the controller? Compares joint values and poses as "
+        "the pendant shows them.",
+    },
+    ("robot_files", ROBOT_FILES): {
+        "import-urdf": "Write a robot file (D-H table, directions, offsets, limits) from a URDF.",
+        "export-urdf": "Write a robot as URDF.",
+        "import-calibration": "Write a robot file from a factory calibration; huge d values that "
+        "cancel become Hayati parameters.",
+        "calibrate": "Estimate corrections to a robot's table, base and tool from measured "
+        "positions; write the corrected robot file.",
+        "predict": "Print where a calibrated arm's tool is at commanded joint values, by the whole "
+        "model with all its terms: a CSV with position and roll, pitch and yaw.",
+        "hand-eye": "Estimate the pose of a camera, with 95 % intervals; name samples and "
+        "conventions that can't be right.",
+    },
+    ("single_jobs", ROBOT_FILES): {
+        "teach": "Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.",
+    },
+    ("programs", PROGRAMS): {
+        "check-program": "Check each motion of robot programs. Findings are lines: file:line: level: message \\[code].",
+        "program": "Write robot programs from paths.",
+    },
+    ("single_jobs", JOBS): {
+        "compute": "Compute a stage: tables and summary.json.",
+        "views": "Write a robot's recordings (always in English), a picture of each, and pages from results.",
+        "index": "Write the index.",
+        "article": "Write the page on the article from results; `er3a run --study "
+        "config/article.yaml` also computes them.",
+    },
 }
+COMMANDS = {name: (*group, line) for group, lines in _GROUPS.items() for name, line in lines.items()}
 """By name, in the order of ``--help``: the module that registers it, its panel in the help, its first sentence."""
 
 

@@ -97,7 +97,7 @@ def check(
         except Er3aError as error:
             options.print_error(error)
             parts = {key: getattr(error, key, None) for key in ("field", "problem", "remedy")}
-            found.append({"file": str(file), "in_order": False, **parts})
+            found.append({"file": str(file), "in_order": False} | parts)
             worst = 2
             continue
         more: dict[str, object] = {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
@@ -112,11 +112,11 @@ def check(
         if not as_json:
             for one, text in broken:
                 print(f"{file}:{one.place.line}: {WORDS[one.level]}: {text} [{one.finding.code}]")
-            state = f"{len(doubts)} doubtful unit{'s' if len(doubts) > 1 else ''}" if doubts else "in order"
-            state = "numbers that can't be meant" if wrong and not doubts else state
+            state = "numbers that can't be meant" if wrong else "in order"
+            state = f"{len(doubts)} doubtful unit{'s' if len(doubts) > 1 else ''}" if doubts else state
             only = f"; not examined: {WHAT_IT_DOES}" if kind == PROGRAM else ""
             print(f"{file}: {kind}, {state}{only}")
-    if sarif is not None:
+    if sarif:
         write_text(sarif, json.dumps(sarif_log("er3a check", rules), indent=1, ensure_ascii=False) + "\n")
     if as_json:
         options.print_json(found)
@@ -140,16 +140,14 @@ def run(
     if not run_study(study, options.DEFAULT_RESULTS, options.DEFAULT_REPORTS, words or []):
         raise typer.Exit(2)
     asked = parsed(words or [])
-    if not (fail_on or asked.dryrun):  # what was made, and changed in the meantime
+    if fail_on:
+        _end_with_findings(read_verdicts(load_study(study), options.DEFAULT_RESULTS), fail_on)
+    elif not asked.dryrun:  # what was made, and changed in the meantime
         stages, robots = asked_stages(asked.targets), asked_robots(asked.targets)
         with suppress(ResultError):  # such as after an option that only lists something
             found = read_verdicts(load_study(study), options.DEFAULT_RESULTS)
-            own = [
-                each for each in found if each.stage in (stages or STAGES) and each.robot in (robots or [each.robot])
-            ]
-            _end_with_findings([verdict for verdict in own if verdict.outdated], options.FailOn.fail)
-    if fail_on:
-        _end_with_findings(read_verdicts(load_study(study), options.DEFAULT_RESULTS), fail_on)
+            old = [each for each in found if each.outdated and each.stage in (stages or STAGES)]
+            _end_with_findings([each for each in old if each.robot in (robots or [each.robot])], options.FailOn.fail)
 
 
 @options.app.command(rich_help_panel=options.FIRST)
@@ -166,11 +164,8 @@ def verdicts(
     if as_json:
         options.print_json([asdict(verdict) for verdict in found])
     else:
-        status = {True: ", as expected", False: ""}
-        options.print_table(
-            ("robot", "stage", "verdict", "finding"),
-            ((v.robot, v.stage, v.status.replace("_", " ") + status[v.is_demonstration], v.text) for v in found),
-        )
+        rows = ((each.robot, each.stage, each.shown, each.text) for each in found)
+        options.print_table(("robot", "stage", "verdict", "finding"), rows)
     if fail_on:
         _end_with_findings(found, fail_on)
 
@@ -178,16 +173,14 @@ def verdicts(
 def _end_with_findings(found: Sequence[StageVerdict], level: options.FailOn) -> None:
     """Print the verdicts at a level or worse, and end with exit code 1 if there are any."""
     counted = [verdict for verdict in found if verdict.counts(level.value)]
-    skipped = Counter(verdict.status.replace("_", " ") for verdict in found if verdict.is_skipped)
-    if skipped:
+    if skipped := Counter(verdict.shown for verdict in found if verdict.is_skipped):
         named = ", ".join(f"{count} {status}" for status, count in skipped.items())
         options.print_note(f"neither passed nor failed: {named}, of {len(found)} stages")
     if shown := [f"{verdict.robot}, {verdict.stage}" for verdict in found if verdict.is_demonstration]:
         options.print_note(f"demonstrations, which fail as expected and do not count: {'; '.join(shown)}")
     for verdict in counted:
-        status = verdict.status.replace("_", " ")
         expected = f"; expected: {verdict.expected}" if verdict.is_otherwise else ""
-        options.print_note(f"{verdict.robot}, {verdict.stage} ({status}{expected}): {verdict.text}")
+        options.print_note(f"{verdict.robot}, {verdict.stage} ({verdict.shown}{expected}): {verdict.text}")
     if counted:
         raise typer.Exit(1)
 

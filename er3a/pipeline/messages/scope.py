@@ -31,7 +31,7 @@ GAP_WORDS: Mapping[str, str] = words(
     {
         "unsettled": "documents leave entries open, or settle them but for signs",
         "not_run": "the check was not made",
-        "limits_assumed": "the robot's file assumes the limits",
+        "limits_assumed": "the robot's file assumes the limits: write the arm's own into it",
         "not_followed": "paths not followed",
         "points_missed": "points that the motion misses as it rounds corners",
         "tool_turned": "the joints set only part of how the tool is turned (off by up to {amount:.1f}°)",
@@ -60,6 +60,7 @@ GAP_WORDS: Mapping[str, str] = words(
         "program_findings": "doubts or faults in these programs",
         "program_lines": "lines not followed each time",
         "units": "numbers that look like radians or metres (`units_checked: true` confirms them)",
+        "as_above": "as above",
     }
 )
 """Why a check does not cover all, by the reasons of gaps."""
@@ -171,9 +172,9 @@ def check_name(check: Check) -> str:
 
 def covered_text(found: Coverage) -> str:
     """How much a check covers: all, none, or how many of how many."""
-    none = not (found.complete or found.covered)
-    marks = {"all": found.complete, "none": none, "part": not (found.complete or none)}
-    return sentence("coverage", covered=found.covered, of=found.of, **marks)
+    whole, covered = found.complete, found.covered
+    marks = {"all": whole, "none": not (whole or covered), "part": covered and not whole}
+    return sentence("coverage", covered=covered, of=found.of, **marks)
 
 
 def missed_text(found: Coverage) -> str:

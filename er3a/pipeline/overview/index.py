@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +81,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     """
     verdicts = read_verdicts(study, results)
     stored = {name: _computed(study, name, results / name) for name in study.robots}
-    entries = [_entry(study, name, stored[name], _changed_text(verdicts, name)) for name in study.robots]
+    entries = [_entry(study, name, stored[name], verdicts) for name in study.robots]
     contradicted = {entry.name for entry in entries if entry.use == "never"}
     ranked = sorted(entries, key=lambda entry: USES.index(entry.use))
     chosen = ranked[0]
@@ -105,13 +105,13 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     write_junit(verdicts, folder / "junit.xml")
 
 
-def _changed_text(verdicts: Sequence[StageVerdict], robot: str) -> str:
+def _changed_text(verdicts: Iterable[StageVerdict]) -> str:
     """What has changed since any stage of a robot was computed; empty where nothing has."""
-    names = [*dict.fromkeys(name for each in verdicts if each.robot == robot for name in each.outdated)]
+    names = [*dict.fromkeys(name for each in verdicts for name in each.outdated)]
     if not names:
         return ""
     named = [tr(each) if each in (THE_SETTINGS, THE_CODE) else each for each in names[:MAX_CHANGED]]
-    more = ["…"] if len(names) > MAX_CHANGED else []
+    more = ["…"] * (len(names) > MAX_CHANGED)
     return tr(
         "Changed since, so what stands here tells of what was before (run the study again): {names}.",
         names=joined([*named, *more], ", "),
@@ -129,25 +129,22 @@ def _asked(study: Study) -> list[str]:
     return [name for name in STAGES if any(name in study.stages(robot) for robot in study.robots)]
 
 
-def _entry(study: Study, name: str, stored: Results, outdated: str) -> RobotRow:
+def _entry(study: Study, name: str, stored: Results, verdicts: Sequence[StageVerdict]) -> RobotRow:
     """What the index shows of a robot."""
-    heads, expected = {stage: head_of(each) for stage, each in stored.items()}, study.entry(name).expect
-    table = heads["validation"].status if "validation" in heads else "not_examined"
-    failed = [
-        tr(PAGES[stage])
-        for stage, head in heads.items()
-        if StageVerdict(name, stage, head.status, head.finding.code, "", expected=expected.get(stage)).counts("fail")
-    ]
-    use, said = _use(table, heads.get("validation"), failed)
-    cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in _asked(study)]
-    arm = _seen(study, name, use, stored)
-    return RobotRow(name, arm.title, use, said, cells, side_view([arm], ratio=1.0), arm.note, outdated)
+    heads = {stage: head_of(each) for stage, each in stored.items()}
+    own = {each.stage: each for each in verdicts if each.robot == name}
+    failed = [tr(PAGES[stage]) for stage, each in own.items() if replace(each, outdated=()).counts("fail")]
+    use, said = _use(own["validation"].status, heads.get("validation"), failed)
+    cells = [_cell(own[each], heads, stored) if each in own else None for each in _asked(study)]
+    arm, changed = _seen(study, name, use, stored), _changed_text(own.values())
+    return RobotRow(name, arm.title, use, said, cells, side_view([arm], ratio=1.0), arm.note, changed)
 
 
 def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str]:
     """What to do with a robot's table: a word for its colour, and a few for its reader."""
+    finding = head.finding if head else None
     if table == "fail":
-        same_arm = head is not None and head.finding.code == "validation.defined_otherwise"
+        same_arm = is_one(finding, "validation.defined_otherwise")
         return "never", tr("correct it first") if same_arm else tr("never use")
     if failed:
         return "measure", tr("see {stages}", stages=joined(failed, ", "))
@@ -155,7 +152,6 @@ def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str
         return "use", tr("confirmed")
     if table == "not_examined":
         return "measure", tr("not examined yet")
-    finding = head.finding if head else None
     if table == "caution" and is_one(finding, "validation.left_open") and not finding.contradiction:
         settled = [part.settled or part.up_to_signs for part in finding.parts if part.part == "geometry"]
         if any(settled):  # by independent documents, of lengths and twists
@@ -163,16 +159,16 @@ def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str
     return "measure", tr("don't rely on it yet")
 
 
-def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
+def _cell(verdict: StageVerdict, heads: Mapping[str, Head], stored: Results) -> StageCell:
     """A stage's number; of a table that evidence contradicts it counts for nothing."""
-    if stage not in heads:
-        return StageCell(stage, "not_computed", "–", tr("not computed yet"))
-    head = heads[stage]
-    if head.status == "not_computed":
-        return StageCell(stage, "not_computed", "–", tr("not computed"), head.text)
+    stage, head = verdict.stage, heads.get(verdict.stage)
+    if head is None or head.status == "not_computed":
+        return StageCell(stage, "not_computed", "–", tr("not computed"), head.text if head else "")
     value, note = glance(stored[stage].results)
     if head.no_verdict:
         return StageCell(stage, "no_verdict", value, "")
+    if verdict.said_by:
+        note = tr("see {stages}", stages=tr(PAGES[verdict.said_by]))
     return StageCell(stage, head.sign.split()[0], value, note, head.text)
 
 

@@ -112,7 +112,7 @@ def covered_units(files: int, doubts: Sequence[DoubtfulUnit]) -> Coverage:
     named = [shown_path(Path(each.file)) if each.file else "" for each in doubts]
     places = [": ".join(filter(None, (file, each.key, each.shown))) for file, each in zip(named, doubts)]
     rest = len(places) - NAMED_DOUBTS
-    names = (*places[:NAMED_DOUBTS], *([f"+ {rest}"] if rest > 0 else []))
+    names = (*places[:NAMED_DOUBTS], *[f"+ {rest}"] * (rest > 0))
     files = max(files, len(set(named)))
     return Coverage("units", files - len(set(named)), files, (Open("units", names),) if places else ())
 
@@ -146,8 +146,8 @@ def assumed_values(robot: Robot, replaced: Collection[str]) -> tuple[Open, ...]:
     -------
     assumed : one entry with their names; none if nothing is assumed
     """
-    assumed = [group for group in OWN_VALUES if group in robot.sources and robot.sources[group].grade == "inferred"]
-    names = tuple(group for group in assumed if group not in replaced)
+    own = {group: robot.sources[group].grade for group in OWN_VALUES if group in robot.sources}
+    names = tuple(group for group, grade in own.items() if grade == "inferred" and group not in replaced)
     return (Open("own_values", names),) if names else ()
 
 

@@ -57,7 +57,7 @@ def compute(name: str, study: Study, robot: str, folder: Path) -> str | None:
     read = input_records(file for file in study.inputs(robot, name) if file.is_file())
     with noted_doubts() as doubts:
         results = _computed(stage, study, robot)
-    doubts = [each for each in doubts if stage.weighs or not each.key.startswith(MASSES)]
+    doubts = [each for each in doubts if stage.weighs or not each.key.startswith("inertia.")]
     if not isinstance(results, AbsentResults):
         summary = _with_inputs(results.summary, study, robot, stage)
         checked = (*summary.checked, covered_units(len(read), doubts))
@@ -80,9 +80,6 @@ def _with_inputs(summary: Summary, study: Study, name: str, stage: Stage) -> Sum
     replaced = [group for group in ("base", "tool") if getattr(entry, group)]
     checked = uncovered(summary.checked, assumed_limits(robot))
     return replace(summary, checked=checked, assumed=(*summary.assumed, *assumed_values(robot, replaced)))
-
-
-MASSES = "inertia."
 
 
 def _computed(stage: Stage, study: Study, robot: str) -> Results:
