@@ -52,7 +52,7 @@ def _(results: ValidationResults) -> Glance:
     if not evidence or not evidence.unconfirmed:
         return value, ""
     known = known_alone(evidence)
-    return value, tr("{count} of {all} settled", count=known - len(evidence.unconfirmed), all=known)
+    return value, tr("{count}/{all} settled", count=known - len(evidence.unconfirmed), all=known)
 
 
 @glance.register

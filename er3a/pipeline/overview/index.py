@@ -55,7 +55,7 @@ class RobotRow:
     ----------
     decision, use : what to do with it, in few words, and in one: ``plan``, ``never``, ``measure``
     cells : in the order of the stages; None where a stage was not asked for
-    seen, reach : the arm and what it reaches, small, and how far in words
+    seen : the arm and what it reaches, small
     outdated : what has changed since its results were computed; empty where nothing has
     """
 
@@ -65,7 +65,6 @@ class RobotRow:
     decision: str
     cells: Sequence[StageCell | None]
     seen: str
-    reach: str
     outdated: str
 
 
@@ -141,7 +140,7 @@ def _entry(study: Study, name: str, stored: Results, outdated: str) -> RobotRow:
     use, said = _use(table, heads.get("validation"), failed)
     cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in _asked(study)]
     arm = _seen(study, name, use, stored)
-    return RobotRow(name, arm.title, use, said, cells, side_view([arm], ratio=1.0), arm.note, outdated)
+    return RobotRow(name, arm.title, use, said, cells, side_view([arm], ratio=1.0), outdated)
 
 
 def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str]:
@@ -160,7 +159,7 @@ def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str
         settled = [part.settled or part.up_to_signs for part in finding.parts if part.part == "geometry"]
         if any(settled):  # by independent documents, of lengths and twists
             return "plan", tr("plan only")
-    return "measure", tr("don't rely on it yet")
+    return "measure", tr("measure first")
 
 
 def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
@@ -220,7 +219,7 @@ def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Map
     """Which numbers are wrong, which paths may run, where the tray goes: as far as the study asks."""
     trusted = [entry.name for entry in entries if entry.use != "never"]
     found = [
-        table_tile(study, doubtful, stored[doubtful]),
+        table_tile(doubtful, stored[doubtful]),
         *(
             motions_tile(study, name, stored[name][stage])
             for stage in ("trajectory", "programs")

@@ -39,7 +39,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     instead = alternative_table(study, stored) if contradicted else None
     if instead and (right := found_by(stored, "workspace", f"../{instead}")):
         arms.insert(0, (study.robot(instead), right.results))
-        answer = _contradicted(right.results.summary, summary)
+        far, wrong = (fixed(1000 * each.summary.reach_m.furthest_from_axis, 0) for _, each in arms)
+        answer = Answer("", tr("The flange reaches {far}, not {wrong} mm.", far=far, wrong=wrong))
     render_stage(
         study,
         stored,
@@ -64,18 +65,11 @@ def _labelled(
     return workspace_figures.labelled(arms, floor_mm, contradicted)
 
 
-def _contradicted(right: model.WorkspaceSummary, wrong: model.WorkspaceSummary) -> Answer:
-    """How far the arm reaches by the table to use instead, and by the one that evidence contradicts."""
-    far, not_far = (fixed(1000 * each.reach_m.furthest_from_axis, 0) for each in (right, wrong))
-    volume, no_volume = (with_unit(fixed(each.volume_m3.middle, 2), "m³") for each in (right, wrong))
-    keys = [(volume, tr("not {wrong}", wrong=no_volume))]
-    return Answer("", tr("The flange reaches {far}, not {wrong} mm.", far=far, wrong=not_far), keys=keys)
-
-
 def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: Sequence[tuple[str, str]]) -> Answer:
     """How far the arm reaches, its voids, where the tray goes, and the ``payload`` where no other page says it."""
     # The void that the picture shows comes first.
-    volume, voids = summary.volume_m3, sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
+    in_order = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
+    volume, voids = summary.volume_m3, [_void_as_row(*each) for each in in_order]
     rest, fix, rows = "", None, _tray_as_rows(placing)
     if summary.voids:
         rest = tr("Voids: {count}.", count=len(summary.voids))
@@ -85,20 +79,14 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
         rest = joined([rest, whole_sentence(tr("{tray} fits", tray=tray.name))], " ")
         fix = Fix(tr("add the tray and its stand to the scene at {centre} mm.", centre=centre), "#tray-1", False)
     keys = [
-        *(
-            (with_unit(workspace_figures.litres(void), "L"), workspace_figures.void_name(number_, void))
-            for number_, void in voids[:1]
-        ),
+        *((void.note, void.name) for void in voids[:1]),
         (
             with_unit(fixed(volume.middle, 2), "m³"),
             tr("± {half} m³, proven", half=fixed((volume.upper - volume.lower) / 2, 2)),
         ),
         *payload,
     ]
-    groups = (
-        Group(tr("Where the tray goes"), rows),
-        Group(tr("Where the tool can't go"), [_void_as_row(*each) for each in voids]),
-    )
+    groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
     return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups, fix)
 
 
