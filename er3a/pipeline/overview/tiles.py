@@ -78,13 +78,12 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     ----------
     found : of the stage trajectory or programs
     """
-    robot, results = study.robot(name), found.results
-    programs = isinstance(results, ProgramsResults)
-    said = programs_answer(robot, results) if programs else paths_answer(robot, results)
+    results = found.results
+    answer = programs_answer if isinstance(results, ProgramsResults) else paths_answer
+    said = answer(study.robot(name), results)
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
-    more = len(rows) - FEW
-    return Tile(said.headline, said.rest, sound, f"{name}/{found.stage}.html", rows=rows[:FEW], more=max(0, more))
+    return Tile(said.headline, said.rest, sound, f"{name}/{found.stage}.html", rows=rows[:FEW], more=len(rows[FEW:]))
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:

@@ -423,7 +423,7 @@ def render_stage(
     if head.no_verdict:
         said = answer if not answer.headline else Answer("", tr("Nothing here holds for this robot."))
         answer = replace(said, headline=tr("Another arm's table."))
-        context["instead"] = alternative_table(study, stored)
+        context["instead"] = alternative_table(study, stored.robot, stored.folder)
     template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
     render(template, output, head.summary, answer=answer, never=never_text(stage), **framed | context)
 
@@ -578,19 +578,19 @@ def _commit() -> str | None:
     return commit and commit + (" + changes" if git("status", "--porcelain", "--untracked-files=no") else "")
 
 
-def alternative_table(study: Study, stored: Stored[Any]) -> str | None:
+def alternative_table(study: Study, robot: str, folder: Path | None) -> str | None:
     """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out.
 
     Parameters
     ----------
-    stored : what a stage found of the robot
+    folder : of the results of any of the robot's stages
 
     Returns
     -------
     name : of the other robot, with a verdict of pass or caution; None where none was computed or bears out
     """
-    results = stored.folder.parents[1] if stored.folder else Path()
-    for other in study.other_tables(stored.robot):
+    results = folder.parents[1] if folder else Path()
+    for other in study.other_tables(robot):
         try:
             status = read_status(results / other / "validation")
         except ResultError:

@@ -48,18 +48,16 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         return results.solutions.take(names == target.name)
 
     played = [solutions_played(robot, target, best_of_branches(of_target(target))) for target in chosen]
-    answer, drawn, wrong_table = both_arms(study, stored, played) or (
+    answer, shown = both_arms(study, stored, played) or (
         _answer(results.targets, chosen),
-        player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen)),
-        None,
+        {"player": player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen))},
     )
     render_stage(
         study,
         stored,
         output,
         answer,
-        player=drawn,
-        wrong_table=wrong_table,
+        **shown,
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target)) for target in chosen],

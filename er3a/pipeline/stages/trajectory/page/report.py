@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from markupsafe import Markup
 
 from er3a.comparison.compare import shift_between
 from er3a.kinematics.forward import forward
@@ -43,7 +42,7 @@ from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, found_by, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Part, judged, may_run
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, judged, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, alternative_table, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
@@ -75,10 +74,9 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         drawn = path_picture(path, _drawn(path, rows), whole_sentence(path_text(path))) if i < count else None
         over_time = _over_time(path, results) if i < count else []
         sections.append({**_section(path, drawn, links, summary), "over_time": over_time})
-    answer, drawn, wrong_table = both_arms(study, stored, [each for each in played if each.name in names]) or (
+    answer, shown = both_arms(study, stored, [each for each in played if each.name in names]) or (
         answer_of(summary, wrong, played, met),
-        player(robot, played, scene, opened=opened(wrong.values())),
-        None,
+        {"player": player(robot, played, scene, opened=opened(wrong.values()))},
     )
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
@@ -93,8 +91,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
         drawn_paths=count,
-        player=drawn,
-        wrong_table=wrong_table,
+        **shown,
         drawing_head=drawing_head(),
     )
 
@@ -126,27 +123,22 @@ def answer_of(
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
     faulty, others = paths[: len(wrong)], paths[len(wrong) :]
-    fault_rows, repairable = {}, []
+    fault_rows, repairable = [], []
     for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
-        fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
-        if path.chosen and path.name not in hindered:
-            repairable.append(replace(fault_rows.pop(path.name), mark="caution"))
+        if path.name in hindered:
+            fault_rows.append(replace(row, fix=None))
+        elif path.chosen:
+            repairable.append(replace(row, mark="caution"))
+        else:
+            fault_rows.append(row)
     sound = [path for path in others if is_met(path) or not path.expect]
-    unlike = [
-        replace(_sound_row(path), mark="fail", note=as_expected(path))
-        for path in others
-        if path.expect and not is_met(path)
-    ]
-    rows = [*unlike, *fault_rows.values()]
-    groups = judged([*rows, *map(_sound_row, sound)], repairable)
+    unlike = [replace(_sound_row(path), mark="fail", note=as_expected(path)) for path in others if path not in sound]
+    groups = judged([*unlike, *fault_rows, *map(_sound_row, sound)], repairable)
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
-    speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance of passing paths"))] if clear else []
-    limit = tr("of assumed speed limits") if any(summary.joint_limits.speed_assumed) else tr("of a joint's speed limit")
-    keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), limit)] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
     return Answer(headline, rest, "", keys, groups, fix)
 
@@ -250,11 +242,11 @@ def strategies_shown(path: model.PathSummary) -> list[str]:
 
 def both_arms(
     study: Study, stored: Stored[Any], played: Sequence[PlayedMotion]
-) -> tuple[Answer, Markup, dict[str, Any] | None] | None:
+) -> tuple[Answer, dict[str, Any]] | None:
     """An arm whose table evidence contradicts over that of the table to use instead, at the same joint values, each
     motion where their tools are farthest from each other; a list of how far that is, and which entries are wrong. None
     for other arms."""
-    instead, found = alternative_table(study, stored), found_by(stored, "validation")
+    instead, found = alternative_table(study, stored.robot, stored.folder), found_by(stored, "validation")
     arms = [study.robot(name) for name in (stored.robot, instead) if name]
     if stored.rests_on.get("validation") != "fail" or not found or len({arm.joints for arm in arms}) != len(arms[1:]):
         return None
@@ -270,7 +262,7 @@ def both_arms(
         rows.append((off[k], far, (motion.name, t)))
     rows.sort(reverse=True)
     whole, most, opened = rows[0]
-    listed = [ListRow("fail", at[0], far, "", at, off / whole, [Part(0.0, 1.0, "fail")]) for off, far, at in rows]
+    listed = [ListRow("fail", at[0], far, "", at, off / whole) for off, far, at in rows]
     answer = Answer(
         "",
         tr("The tool lands up to {far} off.", far=most),
@@ -279,4 +271,4 @@ def both_arms(
     )
     signs = [own_title(arm.title) for arm in arms]
     drawn = player(arms[0], seen, beside=arms[1:], signs=signs, opened=opened)
-    return answer, drawn, evidence_section(found.results.summary.evidence)
+    return answer, {"player": drawn, "wrong_table": evidence_section(found.results.summary.evidence)}

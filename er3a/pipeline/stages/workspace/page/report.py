@@ -32,11 +32,11 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     placing, masses = placing_of(study, stored), found_by(stored, "dynamics")
     known = masses.results.summary if masses else None
     there = tr("What the arm can carry at the tray was not examined.")
-    payload = joined([payload_text(known, robot), there], " ") if placing else ""
+    payload = joined([payload_text(known, robot), there], " ")
     trays = [each.tray for each in placing.tried] if placing else []
     answer = _answer(summary, placing, [] if known else [payload_key(known, robot)])
     arms = [(robot, results)]
-    instead = alternative_table(study, stored) if contradicted else None
+    instead = alternative_table(study, stored.robot, stored.folder) if contradicted else None
     if instead and (right := found_by(stored, "workspace", f"../{instead}")):
         arms.insert(0, (study.robot(instead), right.results))
         far, wrong = (fixed(1000 * each.summary.reach_m.furthest_from_axis, 0) for _, each in arms)
@@ -82,7 +82,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
         *((void.note, void.name) for void in voids[:1]),
         (
             with_unit(fixed(volume.middle, 2), "m³"),
-            tr("± {half} m³, proven", half=fixed((volume.upper - volume.lower) / 2, 2)),
+            tr("± {half} m³, proven", half=fixed(volume.upper - volume.middle, 2)),
         ),
         *payload,
     ]
