@@ -81,14 +81,16 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     verdicts = read_verdicts(study, results)
     stored = {name: _computed(study, name, results / name) for name in study.robots}
     entries = [_entry(study, name, stored[name], _changed_text(verdicts, name)) for name in study.robots]
-    contradicted = {entry.name for entry in entries if entry.use == "never"}
+    wrong = [entry for entry in entries if entry.use == "never"]
     ranked = sorted(entries, key=lambda entry: USES.index(entry.use))
     chosen = ranked[0]
-    drawn = [chosen, *[entry for entry in entries if entry.use == "never" and entry is not chosen][:1]]
+    drawn = [chosen, *[entry for entry in wrong if entry is not chosen][:1]]
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
-        places=page.packed_text(json.dumps([*places(study, folder, contradicted)], ensure_ascii=False)),
+        places=page.packed_text(
+            json.dumps([*places(study, folder, {entry.name for entry in wrong})], ensure_ascii=False)
+        ),
         entries=entries,
         stages=_asked(study),
         questions={name: stage.question for name, stage in STAGES.items()},

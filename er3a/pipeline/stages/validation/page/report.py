@@ -161,7 +161,7 @@ def _both_arms(
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
     scale.
 
-    The lengths that evidence contradicts most are named, and the angles that it leaves open. Where each entry is seen is
+    The lengths that evidence contradicts most are named, and angles that it leaves open. Where each entry is seen is
     marked while it is asked for, with what the other arm has instead. Where documents contradict each other about a
     reach, the arm is stretched, and what each states is a dimension from axis 1 on below it, with its source; that of
     the table in its colour."""
