@@ -211,7 +211,6 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     validated = results / name / "validation"
     known = is_computed(validated)
-    first_caveat = caveat(read_foundation(validated) if known else "not_computed")
     write_panel(
         study.robot(name),
         output,
@@ -220,7 +219,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         home=_home(study, name),
         robots=robots_with(study, "teach"),
         robot_pages=study.pages(name),
-        first_caveat=first_caveat,
+        first_caveat=caveat(read_foundation(validated) if known else "not_computed"),
         instead=alternative_table(study, name, validated),
         head=program_head(validated if known else None),
         condition=condition_of(validated) if known else "",
