@@ -158,9 +158,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     rows = []
     for motor in order:
         *moment, off = _moment_of(results, motor)
-        rows.append(
-            _row(motor, (motor.peak, off), f"J{motor.joint}, {moment[0]}", (*moment,), longest, motor.peak_limit)
-        )
+        rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {path}", (path, t), longest, motor.peak_limit))
     still = [
         _row(
             motor, (motor.holding, held.tolerance), holding_name(motor.joint), (holding_name(motor.joint), 0.0), longest
