@@ -157,7 +157,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
     rows = []
     for motor in order:
-        *moment, off = _moment_of(results, motor)
+        path, t, off = _moment_of(results, motor)
         rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {path}", (path, t), longest, motor.peak_limit))
     still = [
         _row(
