@@ -402,7 +402,7 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
     assert meant
     own, number = said.pop("er3_600/trajectory.html")
     assert own == found.summary.verdict.status
-    assert number.split()[1] == f"{len(paths) - len(wrong)}/{len(paths) - len(meant)}"
+    assert number == f"{len(paths) - len(wrong)}/{len(paths) - len(meant)}"
     assert {status for status, _ in said.values()} == {"not_computed"}
     rows = index.xpath("//*[contains(@class, 'tile')]//*[contains(@class, 'runs')]//li")
     played = [parse_qs(urlsplit(row.find("a").get("href")).query) for row in rows]

@@ -215,7 +215,7 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     }
     sound = {"programs": ["through"]}
     assert line_of(placing(stored, robot, {}, sound)) == (
-        "On a stand 275 mm high on table (z = 100 mm), centre (350, 0, 400) mm, edges 150 × 200 × 50 mm along x, y, z: "
+        "On a stand 275 mm high on table, centre (350, 0, 400) mm, edges 150 × 200 × 50 mm along x, y, z: "
         "in the way of 1 of the 1 motions that pass without it."
     )
     placement = stored["workspace"].results.summary.placement

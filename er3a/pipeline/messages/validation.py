@@ -66,7 +66,6 @@ PART_ENTRIES = words(
 names_in_words("references", "reference.group", GROUP_WORDS)
 names_in_words("loose_references", "reference.group", GROUP_WORDS)
 names_in_words("tool_and_base", "placed", PLACED)
-GROUPS = GROUP_WORDS | words({"table_sanity": "table sanity", "round_trips": "round trips"})
 
 
 TEXTS = texts(

@@ -55,7 +55,6 @@ TEXTS = texts(
             "room for it{too_small:?}][nowhere on it does the tool reach all of the tray{out_of_reach:?}][the arm "
             "comes within {margin} mm of the scene or of itself{in_the_way:?}]."
         ),
-        "box.contradicted": "No place for the tray is recommended: evidence contradicts this table.",
         "box.run_again": (
             "Before a motion is run there, put the tray, and its stand if any, into the study's scene file as boxes, "
             "and run again.[ No tool is given: repeat it with your tool's length.{bare:?}]"

@@ -18,6 +18,7 @@ from er3a.pipeline.stages.validation.page.evidence_section import known_alone
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import sound_motions
+from er3a.pipeline.stages.workspace.page.workspace_figures import litres
 
 Glance = tuple[str, str]
 
@@ -51,15 +52,15 @@ def _(results: ValidationResults) -> Glance:
     if not evidence or not evidence.unconfirmed:
         return value, ""
     known = known_alone(evidence)
-    return value, tr("{count} of {all} settled", count=known - len(evidence.unconfirmed), all=known)
+    return value, tr("{count}/{all} settled", count=known - len(evidence.unconfirmed), all=known)
 
 
 @glance.register
 def _(results: WorkspaceResults) -> Glance:
     summary = results.summary
-    volume = summary.volume_m3
     far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
-    return far, with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³")
+    sizes = [with_unit(litres(void), "L") for void in summary.voids if void.holds_shoulder]
+    return far, tr("void {size}", size=sizes[0]) if sizes else with_unit(fixed(summary.volume_m3.middle, 2), "m³")
 
 
 @glance.register

@@ -55,7 +55,7 @@ class RobotRow:
     ----------
     decision, use : what to do with it, in few words, and in one: ``plan``, ``never``, ``measure``
     cells : in the order of the stages; None where a stage was not asked for
-    seen, reach : the arm and what it reaches, small, and how far in words
+    seen : the arm and what it reaches, small
     outdated : what has changed since its results were computed; empty where nothing has
     """
 
@@ -65,7 +65,6 @@ class RobotRow:
     decision: str
     cells: Sequence[StageCell | None]
     seen: str
-    reach: str
     outdated: str
 
 
@@ -82,14 +81,16 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     verdicts = read_verdicts(study, results)
     stored = {name: _computed(study, name, results / name) for name in study.robots}
     entries = [_entry(study, name, stored[name], verdicts) for name in study.robots]
-    contradicted = {entry.name for entry in entries if entry.use == "never"}
+    wrong = [entry for entry in entries if entry.use == "never"]
     ranked = sorted(entries, key=lambda entry: USES.index(entry.use))
     chosen = ranked[0]
-    drawn = [chosen, *[entry for entry in entries if entry.use == "never" and entry is not chosen][:1]]
+    drawn = [chosen, *[entry for entry in wrong if entry is not chosen][:1]]
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
-        places=page.packed_text(json.dumps([*places(study, folder, contradicted)], ensure_ascii=False)),
+        places=page.packed_text(
+            json.dumps([*places(study, folder, {entry.name for entry in wrong})], ensure_ascii=False)
+        ),
         entries=entries,
         stages=_asked(study),
         questions={name: stage.question for name, stage in STAGES.items()},
@@ -134,10 +135,11 @@ def _entry(study: Study, name: str, stored: Results, verdicts: Sequence[StageVer
     heads = {stage: head_of(each) for stage, each in stored.items()}
     own = {each.stage: each for each in verdicts if each.robot == name}
     failed = [tr(PAGES[stage]) for stage, each in own.items() if replace(each, outdated=()).counts("fail")]
-    use, said = _use(own["validation"].status, heads.get("validation"), failed)
+    table = own["validation"].status if "validation" in own else "not_examined"
+    use, said = _use(table, heads.get("validation"), failed)
     cells = [_cell(own[each], heads, stored) if each in own else None for each in _asked(study)]
     arm, changed = _seen(study, name, use, stored), _changed_text(own.values())
-    return RobotRow(name, arm.title, use, said, cells, side_view([arm], ratio=1.0), arm.note, changed)
+    return RobotRow(name, arm.title, use, said, cells, side_view([arm], ratio=1.0), changed)
 
 
 def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str]:
@@ -156,7 +158,7 @@ def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str
         settled = [part.settled or part.up_to_signs for part in finding.parts if part.part == "geometry"]
         if any(settled):  # by independent documents, of lengths and twists
             return "plan", tr("plan only")
-    return "measure", tr("don't rely on it yet")
+    return "measure", tr("measure first")
 
 
 def _cell(verdict: StageVerdict, heads: Mapping[str, Head], stored: Results) -> StageCell:
@@ -216,7 +218,7 @@ def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Map
     """Which numbers are wrong, which paths may run, where the tray goes: as far as the study asks."""
     trusted = [entry.name for entry in entries if entry.use != "never"]
     found = [
-        table_tile(study, doubtful, stored[doubtful]),
+        table_tile(doubtful, stored[doubtful]),
         *(
             motions_tile(study, name, stored[name][stage])
             for stage in ("trajectory", "programs")

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from er3a.pipeline.language import own_title, tr
+from er3a.pipeline.language import tr
 from er3a.pipeline.messages.dynamics import payload_key
 from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.overview.glances import glance
@@ -22,26 +22,25 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import ListRow, Mark
 
 Results = Mapping[str, Stored[Any]]
-FEW = 6  # rows of a tile: so many are seen whole on the first screen
+FEW = 3  # rows of a tile: so many are seen whole on the first screen
 LETTERS = 0.14  # of the reach, in the small view from above
 
 
 @dataclass(frozen=True)
 class Tile:
-    """A question, its picture, and its answer, which leads to the page.
+    """An answer, which leads to its page, and its picture.
 
     ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``, ``rows``, ``drawing``: what is
-    shown, one of them; ``more``: rows that are left to the page.
+    shown, one of them; ``more``: how many rows are left to the page.
     """
 
-    title: str
     answer: str
     rest: str
     mark: Mark
     address: str
     entries: Mapping[str, Any] | None = None
     rows: Sequence[ListRow] = ()
-    more: Sequence[ListRow] = ()
+    more: int = 0
     drawing: str = ""
 
 
@@ -50,7 +49,7 @@ def first_with(stage: str, names: Iterable[str], stored: Mapping[str, Results]) 
     return next((name for name in names if stage in stored[name] and glance(stored[name][stage].results)[0]), None)
 
 
-def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
+def table_tile(name: str, stored: Results) -> Tile | None:
     """Which entries of a robot's table evidence contradicts or leaves open; None where no document speaks of it.
 
     Parameters
@@ -60,16 +59,16 @@ def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
     results = stored["validation"].results if "validation" in stored else None
     if not isinstance(results, ValidationResults) or results.summary.evidence is None:
         return None
-    robot, evidence = study.robot(name), results.summary.evidence
+    evidence = results.summary.evidence
     bad = evidence.contradicted
     answer = (
-        tr("{count} of {all} contradicted.", count=bad, all=known_alone(evidence))
+        tr("{count} of {all} numbers contradicted.", count=bad, all=known_alone(evidence))
         if bad
-        else tr("{count} not settled", count=len(evidence.unconfirmed))
+        else tr("{count} numbers not settled", count=len(evidence.unconfirmed))
     )
     mark: Mark = "fail" if bad else "caution" if evidence.unconfirmed else "pass"
-    title, entries = own_title(robot.title), evidence_section(evidence)
-    return Tile(tr("Which numbers are wrong?"), answer, title, mark, f"{name}/validation.html", entries)
+    entries = evidence_section(evidence)
+    return Tile(answer, "", mark, f"{name}/validation.html", entries)
 
 
 def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
@@ -79,17 +78,12 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     ----------
     found : of the stage trajectory or programs
     """
-    robot, results = study.robot(name), found.results
-    programs = isinstance(results, ProgramsResults)
-    said = programs_answer(robot, results) if programs else paths_answer(robot, results)
-    title = tr("Which programs pass?") if programs else tr("Which paths pass?")
+    results = found.results
+    answer = programs_answer if isinstance(results, ProgramsResults) else paths_answer
+    said = answer(study.robot(name), results)
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
-    good = [row for row in rows if row.mark == "pass"]
-    bad = [row for row in rows if row not in good][: max(FEW // 2, FEW - len(good))]
-    few = [*bad, *good[: FEW - len(bad)]]  # half of them may not run, or more where few may
-    more = [row for row in rows if row not in few]
-    return Tile(title, said.headline, said.rest, sound, f"{name}/{found.stage}.html", rows=few, more=more)
+    return Tile(said.headline, said.rest, sound, f"{name}/{found.stage}.html", rows=rows[:FEW], more=len(rows[FEW:]))
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
@@ -101,7 +95,6 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     drawing = from_above(robot, results, study.scene(name, "capability"), placing.tray, LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     carried, _ = payload_key(known, robot)
-    answer = tr("Centre at {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
+    answer = tr("Tray at {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
     rest = tr("{where}. Payload {kg}.", where=placing.tray.where, kg=carried)
-    title = tr("Where does the tray go?")
-    return Tile(title, answer, rest, "pass", f"{name}/workspace.html", drawing=drawing)
+    return Tile(answer, rest, "pass", f"{name}/workspace.html", drawing=drawing)

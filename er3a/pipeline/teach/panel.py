@@ -41,7 +41,7 @@ from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.drawn import drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
-from er3a.pipeline.viewing.page import FOUNDATION_WORDS, render, robots_with, run_command
+from er3a.pipeline.viewing.page import FOUNDATION_WORDS, alternative_table, render, robots_with, run_command
 from er3a.pipeline.viewing.palette import JOINTS, TOUCHING
 from er3a.pipeline.viewing.still import scene_still
 from er3a.programs.writing import ascii_text
@@ -211,7 +211,6 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     validated = results / name / "validation"
     known = is_computed(validated)
-    first_caveat = caveat(read_foundation(validated) if known else "not_computed")
     write_panel(
         study.robot(name),
         output,
@@ -220,7 +219,8 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         home=_home(study, name),
         robots=robots_with(study, "teach"),
         robot_pages=study.pages(name),
-        first_caveat=first_caveat,
+        first_caveat=caveat(read_foundation(validated) if known else "not_computed"),
+        instead=alternative_table(study, name, validated),
         head=program_head(validated if known else None),
         condition=condition_of(validated) if known else "",
         command=run_command(study, f"{name}/teach.html"),
@@ -249,6 +249,7 @@ def write_panel(
     robots: Sequence[tuple[str, str, str]] = (),
     robot_pages: Sequence[str] = (),
     first_caveat: Caveat | None = None,
+    instead: str | None = None,
     head: Sequence[str] | None = None,
     condition: str = "",
 ) -> None:
@@ -261,6 +262,7 @@ def write_panel(
         their limits, but for the one that turns the arm farthest from singular
     robots, robot_pages : of the study: arms with a panel (name, title, address), and this arm's other pages
     first_caveat : what to know of its table, if anything; condition : what of it has to be confirmed
+    instead : of ``robots`` that of the table to use where evidence contradicts this one
     head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
@@ -288,6 +290,7 @@ def write_panel(
         words=panel["words"],
         foundation=tr(FOUNDATION_WORDS[first_caveat.status]) if first_caveat else "",
         first_caveat=first_caveat,
+        instead=instead,
         condition=condition,
         panel=panel,
         drawing_head=drawing_head([*SPACE, *sorted(_HERE.glob("*.js"))]),

@@ -26,7 +26,7 @@ export class Orbit {
   readColours() {
     const style = getComputedStyle(document.documentElement);
     const named = (name) => style.getPropertyValue(`--${name}`).trim();
-    this.page = { ink: named("ink"), grid: named("line"), muted: named("muted"), halo: named("card"), touching: named("fail"), doubtful: named("caution"), accent: named("accent") };
+    this.page = { ink: named("ink"), grid: named("line"), muted: named("muted"), halo: named("card"), hole: named("hole"), touching: named("fail"), doubtful: named("caution"), accent: named("accent") };
   }
 
   look(name) {

@@ -411,8 +411,8 @@ def render_stage(
     study : that the results are of; the command at the page's foot names its file
     stored : what the stage found of a robot
     output : replaced whole, or left as it is
-    answer : its first screen, but where evidence contradicts the table that all rests on; what was not checked comes
-        before it where the verdict is no pass because of that
+    answer : its first screen; what was not checked comes before it where the verdict is no pass because of that. Where
+        evidence contradicts the table that all rests on it is shown only without a headline: it then says what is wrong
     context : what the template needs besides, by name
     """
     stage, framed = stored.stage, _framed(study, stored)
@@ -421,8 +421,9 @@ def render_stage(
         below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
         answer = replace(answer, headline=tr("Not fully checked."), rest=answer.headline, below=below)
     if head.no_verdict:
-        answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."))
-        context["instead"] = alternative_table(study, stored)
+        said = answer if not answer.headline else Answer("", tr("Nothing here holds for this robot."))
+        answer = replace(said, headline=tr("Another arm's table."))
+        context["instead"] = alternative_table(study, stored.robot, stored.folder)
     template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
     render(template, output, head.summary, answer=answer, never=never_text(stage), **framed | context)
 
@@ -577,19 +578,19 @@ def _commit() -> str | None:
     return commit and commit + (" + changes" if git("status", "--porcelain", "--untracked-files=no") else "")
 
 
-def alternative_table(study: Study, stored: Stored[Any]) -> str | None:
+def alternative_table(study: Study, robot: str, folder: Path | None) -> str | None:
     """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out.
 
     Parameters
     ----------
-    stored : what a stage found of the robot
+    folder : of the results of any of the robot's stages
 
     Returns
     -------
     name : of the other robot, with a verdict of pass or caution; None where none was computed or bears out
     """
-    results = stored.folder.parents[1] if stored.folder else Path()
-    for other in study.other_tables(stored.robot):
+    results = folder.parents[1] if folder else Path()
+    for other in study.other_tables(robot):
         try:
             status = read_status(results / other / "validation")
         except ResultError:

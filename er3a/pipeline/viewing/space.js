@@ -120,7 +120,7 @@ export class Space extends Orbit {
     ]);
     this.segments(ends.flatMap(([x, y]) => [centre[0] + x, centre[1] + y, z]), this.page.grid, 1, false);
     if (this.ground) return;
-    this.ground = new three.Mesh(new three.PlaneGeometry(2 * half, 2 * half), new three.ShadowMaterial({ opacity: 0.22 }));
+    this.ground = new three.Mesh(new three.PlaneGeometry(2 * half, 2 * half), new three.ShadowMaterial({ opacity: 0.22, depthWrite: false }));
     this.ground.position.set(centre[0], centre[1], z);
     this.ground.receiveShadow = true;
     this.scene.add(this.ground);

@@ -131,6 +131,11 @@ class Bounds:
     lower: float
     upper: float
 
+    @property
+    def middle(self) -> float:
+        """Between both."""
+        return (self.lower + self.upper) / 2
+
 
 @dataclass(frozen=True)
 class SectionFrame:

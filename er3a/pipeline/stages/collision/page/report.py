@@ -22,7 +22,7 @@ from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, all_caught
 from er3a.pipeline.viewing.page import render_stage
 from er3a.robots.robot import Robot
 
@@ -134,10 +134,9 @@ def _row(
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     if of_path and found.name in unreached and mark != "fail":
         mark = "none"
-    bar = [Part(0.0, 1.0, mark)] if mark in ("none", "fail") else []
     fix = advice.get(found.name) if mark == "fail" and of_path else None
     length = abs(found.clearance_mm) / most_mm
-    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, bar, fix)
+    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, fix=fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

@@ -122,14 +122,14 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
 
 def _opened(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[str, float]:
     """Where a joint needs most: the pose that it holds, if that asks for more than any path."""
-    return (holding_name(motor.joint), 0.0) if motor.holding > motor.peak else _moment_of(results, motor)
+    return (holding_name(motor.joint), 0.0) if motor.holding > motor.peak else _moment_of(results, motor)[:2]
 
 
-def _moment_of(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[str, float]:
-    """The path and the time (s) at which a joint needs most."""
+def _moment_of(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[str, float, float]:
+    """The path and the time (s) at which a joint needs most, and the tolerance of that."""
     rows = results.torques
     at = int(np.argmin(np.abs(np.abs(rows.torque[:, motor.joint - 1]) - motor.peak)))
-    return str(rows.path[at]), float(rows.t_s[at])
+    return str(rows.path[at]), float(rows.t_s[at]), float(rows.tolerance[at, motor.joint - 1])
 
 
 def _worst(motors: Sequence[model.MotorNeed]) -> model.MotorNeed:
@@ -152,19 +152,13 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     headline = tr("Within all limits.") if limited else tr("J{joint} bears most.", joint=worst.joint)
     if over:
         headline = tr("Too much for {joints}.", joints=joined(over, ", "))
-    moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
+    holding = with_unit(number(worst.holding, 2), worst.unit)
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
     rows = []
     for motor in order:
-        moment = _moment_of(results, motor)
-        off = max(
-            load.tolerance
-            for path in summary.paths
-            for load in path.joints
-            if path.counts and load.joint == motor.joint and load.peak == motor.peak
-        )
-        rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {moment[0]}", moment, longest, motor.peak_limit))
+        path, t, off = _moment_of(results, motor)
+        rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {path}", (path, t), longest, motor.peak_limit))
     still = [
         _row(
             motor, (motor.holding, held.tolerance), holding_name(motor.joint), (holding_name(motor.joint), 0.0), longest
@@ -178,11 +172,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
         headline,
         "" if limited or over else tr("Motor limits are missing."),
         tr("Lower bounds: {parts} are missing.", parts=joined(left, ", ")) if left else "",
-        [
-            (moving, tr("J{joint} moving", joint=worst.joint)),
-            (holding, tr("J{joint} holding", joint=worst.joint)),
-            payload,
-        ],
+        [(holding, tr("J{joint} holding", joint=worst.joint)), payload],
         [
             Group(title, [row for row in found if row.length >= SEEN])
             for title, found in ((tr("Greatest torque on the paths"), rows), (tr("Holding, in the worst pose"), still))

@@ -26,7 +26,7 @@ from er3a.pipeline.stages.inverse.page.played import (
     solutions_played,
     with_singularity,
 )
-from er3a.pipeline.stages.trajectory.page.played import both_arms
+from er3a.pipeline.stages.trajectory.page.report import both_arms
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
@@ -48,13 +48,16 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         return results.solutions.take(names == target.name)
 
     played = [solutions_played(robot, target, best_of_branches(of_target(target))) for target in chosen]
+    answer, shown = both_arms(study, stored, played) or (
+        _answer(results.targets, chosen),
+        {"player": player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen))},
+    )
     render_stage(
         study,
         stored,
         output,
-        _answer(results.targets, chosen),
-        player=both_arms(study, stored, played)
-        or player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen)),
+        answer,
+        **shown,
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target)) for target in chosen],

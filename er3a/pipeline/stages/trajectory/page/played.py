@@ -5,17 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from er3a.collision.pairs import names_of
-from er3a.comparison.compare import shift_between
 from er3a.finding import Finding, fact, is_one
-from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.language import tr
 from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
@@ -37,12 +33,8 @@ from er3a.pipeline.messages.trajectory import (
     switch_text,
 )
 from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
-from er3a.pipeline.player.player import player
-from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
-from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import alternative_table
 from er3a.planning.motion_faults import RATES, rate_ratio
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -358,23 +350,3 @@ def kinds(path: model.PathSummary) -> tuple[tuple[str, tuple[model.Stretch, ...]
         (tr("undecided"), path.undecided),
         (tr("collision"), path.collisions),
     )
-
-
-def both_arms(study: Study, stored: Stored[Any], played: Sequence[PlayedMotion]) -> Markup:
-    """An arm whose table evidence contradicts over that of the table to use instead, at the same joint values, opened
-    where their tools are farthest from each other; empty for other arms."""
-    instead = stored.rests_on.get("validation") == "fail" and alternative_table(study, stored)
-    arms = [study.robot(name) for name in (stored.robot, instead) if name]
-    if not instead or arms[0].joints != arms[1].joints:
-        return Markup()
-    seen = []
-    for motion in played:
-        ends = [forward(arm, np.vstack([motion.q, 0 * motion.q[:1]])) for arm in arms]
-        *off, zero = shift_between(*ends)
-        k = np.argmax(off)
-        far, most = (with_unit(fixed(1000 * each, 0), "mm") for each in (off[k], zero))
-        said = tr("Same joint angles, other geometry: tool up to {far} off, {most} at zero.", far=far, most=most)
-        t, (start, end) = motion.t[k], (T[k, :3, 3].tolist() for T in ends)
-        seen.append(replace(motion, text=said, beside=(motion.q,), marks=[Mark(t, t, start, end, far)], ghosts=()))
-    first = seen[0].name, seen[0].marks[0].t0
-    return player(arms[0], seen, beside=arms[1:], signs=[own_title(arm.title) for arm in arms], opened=first)

@@ -9,7 +9,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from er3a.pipeline.language import tr, using, with_unit
+from er3a.comparison.compare import shift_between
+from er3a.kinematics.forward import forward
+from er3a.pipeline.language import own_title, tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
@@ -21,7 +23,7 @@ from er3a.pipeline.messages.trajectory import (
     strategy_text,
     strategy_word,
 )
-from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_of, opened, row_of
+from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, fix_of, opened, row_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -29,7 +31,6 @@ from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.page.path_figures import fault_picture, nearness_picture, path_picture
 from er3a.pipeline.stages.trajectory.page.played import (
-    both_arms,
     faults,
     motions,
     near_assumed,
@@ -38,11 +39,12 @@ from er3a.pipeline.stages.trajectory.page.played import (
     worst_first,
 )
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
-from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
+from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
+from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, found_by, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, ListRow, judged, may_run
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, judged, may_run
 from er3a.pipeline.viewing.conditions import program_head
-from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
+from er3a.pipeline.viewing.page import Picture, alternative_table, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot
@@ -64,7 +66,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     met = None if contradicted else met_in_tray(study, stored)
     wrong = {} if contradicted else _by_name(results)
     trays = {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in (met or {}).items()}
-    played = motions(robot, results, trays)
+    played, names = motions(robot, results, trays), [path.name for path in paths]
     for i, path in enumerate(() if contradicted else paths):
         rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count))
@@ -72,12 +74,16 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         drawn = path_picture(path, _drawn(path, rows), whole_sentence(path_text(path))) if i < count else None
         over_time = _over_time(path, results) if i < count else []
         sections.append({**_section(path, drawn, links, summary), "over_time": over_time})
+    answer, shown = both_arms(study, stored, [each for each in played if each.name in names]) or (
+        answer_of(summary, wrong, played, met),
+        {"player": player(robot, played, scene, opened=opened(wrong.values()))},
+    )
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
         study,
         stored,
         output,
-        answer_of(summary, wrong, played, met),
+        answer,
         sections=sections,
         entered=linked(met),
         compared_with_tray=compared_with_tray,
@@ -85,7 +91,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
         drawn_paths=count,
-        player=both_arms(study, stored, played) or player(robot, played, scene, opened=opened(wrong.values())),
+        **shown,
         drawing_head=drawing_head(),
     )
 
@@ -117,27 +123,22 @@ def answer_of(
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
     faulty, others = paths[: len(wrong)], paths[len(wrong) :]
-    fault_rows, repairable = {}, []
+    fault_rows, repairable = [], []
     for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
-        fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
-        if path.chosen and path.name not in hindered:
-            repairable.append(replace(fault_rows.pop(path.name), mark="caution"))
+        if path.name in hindered:
+            fault_rows.append(replace(row, fix=None))
+        elif path.chosen:
+            repairable.append(replace(row, mark="caution"))
+        else:
+            fault_rows.append(row)
     sound = [path for path in others if is_met(path) or not path.expect]
-    unlike = [
-        replace(_sound_row(path), mark="fail", note=as_expected(path))
-        for path in others
-        if path.expect and not is_met(path)
-    ]
-    rows = [*unlike, *fault_rows.values()]
-    groups = judged([*rows, *map(_sound_row, sound)], repairable)
+    unlike = [replace(_sound_row(path), mark="fail", note=as_expected(path)) for path in others if path not in sound]
+    groups = judged([*unlike, *fault_rows, *map(_sound_row, sound)], repairable)
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
-    speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance of passing paths"))] if clear else []
-    limit = tr("of assumed speed limits") if any(summary.joint_limits.speed_assumed) else tr("of a joint's speed limit")
-    keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), limit)] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
     return Answer(headline, rest, "", keys, groups, fix)
 
@@ -237,3 +238,37 @@ def strategies_shown(path: model.PathSummary) -> list[str]:
         text = why if tried.reasons or tried.motion is None else strategy_text(path, tried)
         rows.append(text + (" ←" if tried.name == path.strategy else ""))
     return rows
+
+
+def both_arms(
+    study: Study, stored: Stored[Any], played: Sequence[PlayedMotion]
+) -> tuple[Answer, dict[str, Any]] | None:
+    """An arm whose table evidence contradicts over that of the table to use instead, at the same joint values, each
+    motion where their tools are farthest from each other; a list of how far that is, and which entries are wrong. None
+    for other arms."""
+    instead, found = alternative_table(study, stored.robot, stored.folder), found_by(stored, "validation")
+    arms = [study.robot(name) for name in (stored.robot, instead) if name]
+    if stored.rests_on.get("validation") != "fail" or not found or len({arm.joints for arm in arms}) != len(arms[1:]):
+        return None
+    seen, rows = [], []
+    for motion in played:
+        ends = [forward(arm, motion.q) for arm in arms]
+        off = shift_between(*ends)
+        k = np.argmax(off)
+        far, t = with_unit(fixed(1000 * off[k], 0), "mm"), motion.t[k]
+        start, end = (T[k, :3, 3].tolist() for T in ends)
+        said = whole_sentence(tr("flange {off} off", off=far))
+        seen.append(replace(motion, text=said, beside=(motion.q,), marks=[Mark(t, t, start, end, far)], ghosts=()))
+        rows.append((off[k], far, (motion.name, t)))
+    rows.sort(reverse=True)
+    whole, most, opened = rows[0]
+    listed = [ListRow("fail", at[0], far, "", at, off / whole) for off, far, at in rows]
+    answer = Answer(
+        "",
+        tr("The tool lands up to {far} off.", far=most),
+        tr("Both arms have the same joint values."),
+        groups=[Group(tr("Tool off by"), listed)],
+    )
+    signs = [own_title(arm.title) for arm in arms]
+    drawn = player(arms[0], seen, beside=arms[1:], signs=signs, opened=opened)
+    return answer, {"player": drawn, "wrong_table": evidence_section(found.results.summary.evidence)}

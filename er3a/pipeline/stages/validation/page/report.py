@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured
 from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.say import bracketed, joined, say, word
-from er3a.pipeline.messages.validation import GRADES, GROUPS
+from er3a.pipeline.messages.validation import GRADES
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
@@ -67,11 +66,11 @@ TILT = 0.35  # of a circle around an axis in the drawing's plane, seen a little 
 RADIUS = 0.045  # of such an arrow, of the size of the arm
 BELOW = 0.15  # of a reach: from one line to the next below the base
 LABELLED = 5  # of the lengths that are wrong, at most, so that words have room
-JOG = np.radians(30.0)  # of a joint that one looks at
-VIEWS = {  # which of x, y and z are to the right and upwards for one who looks from there, and their signs
-    N_("from above"): ([1, 0], [-1, 1]),
-    N_("from behind"): ([1, 2], [-1, 1]),
-    N_("from the side"): ([0, 2], [1, 1]),
+JOG = np.radians(np.linspace(0.0, 30.0, 13))  # of a joint that one looks at
+VIEWS = {  # from x, y and z to what is to the right and upwards for one who looks from there
+    N_("from above, base toward you"): [(0, 1), (-1, 0), (0, 0)],
+    N_("from behind"): [(0, 0), (-1, 0), (0, 1)],
+    N_("from the side"): [(1, 0), (0, 0), (0, 1)],
 }
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
@@ -85,17 +84,6 @@ COLUMNS = (
 )
 
 Judged = model.Judged
-
-
-def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
-    """A row for each set and group: how many checks pass, fail, and contradict each other."""
-    counted = dict[tuple[str, str], Counter[str]]()
-    for check in checks:
-        counted.setdefault((check.reference_set or tr("the model itself"), check.group), Counter())[check.status] += 1
-    return [
-        [title, word("group", GROUPS, group), *(counts[status] for status in ("pass", "fail", "conflict"))]
-        for (title, group), counts in counted.items()
-    ]
 
 
 def check_row(check: Judged) -> list[str]:
@@ -124,7 +112,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     table = robot_of(study.table(name)).replace(name=name)
     corrected, _ = diagnosis_section.corrected_robot(table, summary.diagnoses)
     text = robot_text(robot_file(corrected)) if corrected and not summary.is_beyond_correction else ""
-    instead = alternative_table(study, stored) if summary.verdict.status == "fail" else None
+    instead = alternative_table(study, stored.robot, stored.folder) if summary.verdict.status == "fail" else None
     evidence = evidence_section(summary.evidence)
     disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
     q, summed = np.zeros(robot.joints), list[str]()
@@ -159,7 +147,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         corrected=text,
         corrected_address=text_address(text),
         poses=poses_to_read(table) if summary.verdict.status != "fail" else ([], []),
-        groups=group_rows(judged),
         failed=[*map(check_row, failed)],
         columns=COLUMNS,
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
@@ -174,8 +161,8 @@ def _both_arms(
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
     scale.
 
-    The lengths that evidence contradicts most are named, and the angles that it leaves open. Where each entry is seen
-    is marked while it is asked for, with what the other arm has instead. Where documents contradict each other about a
+    The lengths that evidence contradicts most are named, and angles that it leaves open. Where each entry is seen is
+    marked while it is asked for, with what the other arm has instead. Where documents contradict each other about a
     reach, the arm is stretched, and what each states is a dimension from axis 1 on below it, with its source; that of
     the table in its colour."""
     arms = [seen_arm(robot, tr("This table"), tr("stretched out") if disputed else "", q=q)]
@@ -202,7 +189,7 @@ def _both_arms(
             over.append(_turn_arrow(robot, q, entry, lines[entry][0], radius))
             continue
         angle = column in ANGLES
-        if cell["status"] == "open" if angle else column in "ad" and f"#cell-{entry}" in worst:
+        if not disputed and cell["status"] == "open" if angle else column in "ad" and f"#cell-{entry}" in worst:
             said = with_unit(
                 joined([cell["value"], gives], " → " if kind == "wrong" else tr(" or ")), "deg" if angle else "mm"
             )
@@ -219,17 +206,19 @@ def _both_arms(
 def _look(robot: Robot, found: Finding) -> Markup:
     """Where the arm goes when a joint is jogged, and where it would if its direction were the other, seen from where
     the flange is farthest off."""
-    q, jog = meant(robot, found.pose_deg), JOG * np.eye(robot.joints)[found.joint - 1]
-    right, wrong = (1000 * skeleton(robot, each) for each in (q + jog, q - jog))
-    side = max(VIEWS, key=lambda each: np.linalg.norm((right - wrong)[-1, VIEWS[each][0]]))
-    axes, signs = VIEWS[side]
+    q, jog = meant(robot, found.pose_deg), np.eye(robot.joints)[found.joint - 1]
+    ways = np.array([[1000 * skeleton(robot, q + turn * jog) for turn in way] for way in (JOG, -JOG)])
+    side = max(VIEWS, key=lambda each: np.linalg.norm(np.diff(ways[:, -1, -1] @ VIEWS[each], axis=0)))
+    right, wrong = ways @ VIEWS[side]
     arms = [
-        SeenArm(tr("direction{joint} is right", joint=found.joint), "", "right", right[:, axes] * signs),
-        SeenArm(tr("turn its sign"), "", "wrong", wrong[:, axes] * signs),
+        SeenArm(tr("direction{joint} is right", joint=found.joint), "", "right", right[-1]),
+        SeenArm(tr("turn its sign"), "", "wrong", wrong[-1]),
     ]
+    size = 2 * RADIUS * float(np.ptp(right[-1], axis=0).max())
+    over = [DrawnLine(_headed(way[:, -1], size), look) for way, look in ((right, "turn right"), (wrong, "turn wrong"))]
     title = tr("+J{joint}, {side}", joint=found.joint, side=tr(side))
     return Markup('<div class="look" data-entry="{}"><b>{}</b>{}</div>').format(
-        found.entry, title, side_view(arms, ratio=1.0)
+        found.entry, title, side_view(arms, ratio=1.0, over=over)
     )
 
 
@@ -242,11 +231,16 @@ def _turn_arrow(robot: Robot, q: Reals, entry: str, at: Reals, radius: float) ->
     first = [0.0, 0.0, 1.0] if across else [0.0, -1.0, 0.0]
     ring = np.outer(np.cos(AROUND), first) + np.outer(np.sin(AROUND), np.cross(axis, first))
     seen = ring[:, ::2] + TILT * ring[:, 1:2] * np.abs(axis[::2])
-    tip, back = seen[-1], seen[-3] - seen[-1]
-    back *= HEAD / np.linalg.norm(back)
+    return DrawnLine(_headed(at + radius * seen, radius), "turn", entry, f"J{joint}")
+
+
+def _headed(line: Reals, size: float) -> Reals:
+    """A line (k, 2) with an arrow's head of a size at its end."""
+    tip, back = line[-1], line[-3] - line[-1]
+    back *= HEAD * size / np.linalg.norm(back)
     wide = back[::-1] * [-0.7, 0.7]
-    arrow = at + radius * np.stack([*seen, tip + back + wide, tip, tip + back - wide])
-    return DrawnLine(arrow, "turn", entry, f"J{joint}")
+    found: Reals = np.stack([*line, tip + back + wide, tip, tip + back - wide])
+    return found
 
 
 def _kind(status: str) -> LabelKind:

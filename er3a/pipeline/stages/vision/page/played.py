@@ -25,7 +25,7 @@ from er3a.robots.robot import Robot
 
 WAYS = {"move": N_("move to the approach"), "approach": N_("straight to the grasp"), "retreat": N_("retreat")}
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
-SIGHT = 0.08  # of the farthest distance, how far the drawn pyramid reaches: a longer one would outweigh the arm
+SIGHT = 0.2  # of the farthest distance, how far the drawn pyramid reaches: a longer one would outweigh the arm
 CAMERA_M = (0.09, 0.07, 0.07)
 SIDES = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]  # of a pyramid, its top first
 CONE = [*SIDES, *(side[::-1] for side in SIDES)]  # seen from both sides

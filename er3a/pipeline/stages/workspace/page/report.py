@@ -10,7 +10,7 @@ from markupsafe import Markup
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, say, sentence
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
 from er3a.pipeline.results import Stored
@@ -21,7 +21,7 @@ from er3a.pipeline.stages.workspace.page.tray import Placing, found_by, placing_
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow
 from er3a.pipeline.viewing.page import alternative_table, render_stage, whole_sentence
-from er3a.pipeline.viewing.side_view import Kind
+from er3a.robots.robot import Robot
 
 
 def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
@@ -32,42 +32,44 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     placing, masses = placing_of(study, stored), found_by(stored, "dynamics")
     known = masses.results.summary if masses else None
     there = tr("What the arm can carry at the tray was not examined.")
-    payload = joined([payload_text(known, robot), there], " ") if placing else ""
+    payload = joined([payload_text(known, robot), there], " ")
     trays = [each.tray for each in placing.tried] if placing else []
-    context = capability_context(robot, results, placing, payload)
-    if contradicted:
-        context["nowhere"] = sentence("box.contradicted")
+    answer = _answer(summary, placing, [] if known else [payload_key(known, robot)])
+    arms = [(robot, results)]
+    instead = alternative_table(study, stored.robot, stored.folder) if contradicted else None
+    if instead and (right := found_by(stored, "workspace", f"../{instead}")):
+        arms.insert(0, (study.robot(instead), right.results))
+        far, wrong = (fixed(1000 * each.summary.reach_m.furthest_from_axis, 0) for _, each in arms)
+        answer = Answer("", tr("The flange reaches {far}, not {wrong} mm.", far=far, wrong=wrong))
     render_stage(
         study,
         stored,
         output,
-        _answer(summary, placing, [] if known else [payload_key(known, robot)]),
-        labelled=_labelled(study, stored, contradicted),
+        answer,
+        labelled=_labelled(arms, floor_of(study.scene(instead or stored.robot, "capability")), contradicted),
         turning=workspace_figures.in_space(robot, results, scene, trays),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
-        **context,
+        **capability_context(robot, results, placing, payload),
     )
 
 
-def _labelled(study: Study, stored: Stored[model.WorkspaceResults], contradicted: bool) -> Markup | None:
-    """The arm in what it reaches, with names, and where it is contradicted the one to use instead, over the floor of
-    this one's scene; None of an arm that slides along its first axis."""
-    kind: Kind = "wrong" if contradicted else "right"
-    arms = [(study.robot(stored.robot), stored.results, kind)]
-    instead = alternative_table(study, stored) if contradicted else None
-    if instead and (right := found_by(stored, "workspace", f"../{instead}")):
-        arms.insert(0, (study.robot(instead), right.results, "right"))
-    if any(each.summary.proof.bars or each.summary.is_flat for _, each, _ in arms):
+def _labelled(
+    arms: Sequence[tuple[Robot, model.WorkspaceResults]], floor: float | None, contradicted: bool
+) -> Markup | None:
+    """The arm in what it reaches, with names, over the floor (m), and where it is contradicted the one to use instead
+    before it; None of an arm that slides along its first axis."""
+    if any(each.summary.proof.bars or each.summary.is_flat for _, each in arms):
         return None
-    floor = floor_of(study.scene(instead or stored.robot, "capability"))
     floor_mm = None if floor is None else 1000 * (floor - arms[-1][0].base[2, 3])
-    return workspace_figures.labelled(arms, floor_mm)
+    return workspace_figures.labelled(arms, floor_mm, contradicted)
 
 
 def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: Sequence[tuple[str, str]]) -> Answer:
     """How far the arm reaches, its voids, where the tray goes, and the ``payload`` where no other page says it."""
-    reach, volume = summary.reach_m, summary.volume_m3
+    # The void that the picture shows comes first.
+    in_order = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
+    volume, voids = summary.volume_m3, [_void_as_row(*each) for each in in_order]
     rest, fix, rows = "", None, _tray_as_rows(placing)
     if summary.voids:
         rest = tr("Voids: {count}.", count=len(summary.voids))
@@ -77,22 +79,14 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
         rest = joined([rest, whole_sentence(tr("{tray} fits", tray=tray.name))], " ")
         fix = Fix(tr("add the tray and its stand to the scene at {centre} mm.", centre=centre), "#tray-1", False)
     keys = [
+        *((void.note, void.name) for void in voids[:1]),
         (
-            tr("{low} to {high} mm", low=millimetres([reach.lowest]), high=millimetres([reach.highest])),
-            tr("height along axis 1"),
-        ),
-        (
-            with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
-            tr("± {half} m³, proven", half=fixed((volume.upper - volume.lower) / 2, 2)),
+            with_unit(fixed(volume.middle, 2), "m³"),
+            tr("± {half} m³, proven", half=fixed(volume.upper - volume.middle, 2)),
         ),
         *payload,
     ]
-    # The void that the picture shows comes first.
-    voids = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
-    groups = (
-        Group(tr("Where the tray goes"), rows),
-        Group(tr("Where the tool can't go"), [_void_as_row(*each) for each in voids]),
-    )
+    groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
     return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups, fix)
 
 

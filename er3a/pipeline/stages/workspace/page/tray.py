@@ -17,7 +17,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import as_text, own_title, tr
-from er3a.pipeline.messages.say import bracketed, joined
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.player.player import moment
@@ -86,8 +86,6 @@ class Tray:
         if self.below is None:
             return tr("In the air: no surface is known there")
         name = own_title(self.below.name)
-        if (height := millimetres([self.below.height_m])) != "0":
-            name = bracketed(name, f"z = {height} mm")
         if self.floor is None:
             return tr("On {name}", name=name)
         return tr("On a stand {gap} mm high on {name}", gap=millimetres([self.low[2] - self.floor]), name=name)

@@ -140,21 +140,25 @@ def _smoothed(points: Reals, faces: Integers) -> Reals:
     return points
 
 
-def labelled(arms: Sequence[tuple[Robot, model.WorkspaceResults, Kind]], floor_mm: float | None) -> Markup:
+def labelled(
+    arms: Sequence[tuple[Robot, model.WorkspaceResults]], floor_mm: float | None, contradicted: bool
+) -> Markup:
     """Arms in what they reach, seen across axis 1, with names: reach, floor, and the voids all around axis 1. An open
     one and a tray are elsewhere: the view from above shows them.
 
     Parameters
     ----------
-    arms : in red one whose table is wrong, without its voids
+    arms : what is proven of each
     floor_mm : height of the floor in the base's frame; None where there is none
+    contradicted : whether the table of the last arm is: that arm is red, and without its voids
 
     Returns
     -------
     drawing : as HTML
     """
     seen, labels, over = list[SeenArm](), list[Label](), list[DrawnLine]()
-    for robot, results, kind in arms:
+    for robot, results in arms:
+        kind: Kind = "wrong" if contradicted and robot is arms[-1][0] else "right"
         summary, border = results.summary, results.border
         points = skeleton(robot, np.zeros(robot.joints)) - summary.axis.point_m
         arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
@@ -165,7 +169,7 @@ def labelled(arms: Sequence[tuple[Robot, model.WorkspaceResults, Kind]], floor_m
             labels += void_labels(summary)
         far, height = outer[outer[:, 0].argmax()]
         below = outer[:, 1].min() - BELOW * far
-        labels.append(Label(reaches(summary), np.array([-far / 5, below - BELOW * far]), kind))
+        labels.append(Label(reaches(summary), np.array([far / 2, below - BELOW * far]), kind, "reach"))
         over += dimension(far, below, height, kind)
     return side_view(seen, floor_mm, ratio=WIDE if arms[1:] else 1.2, labels=labels, over=over)
 
@@ -194,5 +198,5 @@ def void_labels(summary: model.WorkspaceSummary) -> list[Label]:
         start = 1000 * np.array([across, void.centroid_m[2]])
         at = start + 1000 * summary.reach_m.furthest_from_axis * np.array(ASIDE)
         if void.kind == "enclosed":
-            labels.append(Label(tr("void"), at, "hole", f"hole-{number_}", start, written_there=True))
+            labels.append(Label(void_name(number_, void), at, "hole", f"hole-{number_}", start, written_there=True))
     return labels
