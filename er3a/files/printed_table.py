@@ -13,7 +13,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -262,7 +262,7 @@ def _readers(text: str, columns: Sequence[str]) -> Iterator[tuple[Callable[[], l
     yield lambda: html_grids(text) or latex_grids(text), "marks"
     yield lambda: code_grids(text), "program"
     for mark, grid in line_grids(text):
-        yield lambda grid=grid: [grid], "marks" if mark == MARKS[0] else "lines"
+        yield partial(list, (grid,)), "marks" if mark == MARKS[0] else "lines"
     yield lambda: _stacked(text), "lines"
 
 
