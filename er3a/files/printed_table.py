@@ -188,8 +188,8 @@ def _differ(one: Grid, other: Grid) -> bool:
     """Whether each of two tables has a length that the other lacks, in whatever unit: their digits are compared."""
     found = []
     for (_, header), *rows in (one, other):
-        lengths = [k for k, name in enumerate(header) if {"a", "d"}.intersection(quantities_of([name]))]
-        cells = " ".join(row[k] for _, row in rows for k in lengths if k < len(row))
+        pairs = (pair for _, row in rows for pair in zip(header, row))
+        cells = " ".join(cell for name, cell in pairs if {"a", "d"}.intersection(quantities_of([name])))
         found.append({each.strip("0") for each in re.findall(r"(?<!\w)\d+", cells.replace(".", ""))})
     return bool(found[0] - found[1] and found[1] - found[0])
 
@@ -325,8 +325,8 @@ def _stacked(text: str) -> list[Grid]:
     titles = "".join("t" if heading_of(cell) else " " for _, cell in cells)
     for found in re.finditer("t{4,}", titles):
         width, first = len(found[0]), found.start()
-        rows = [cells[k : k + width] for k in range(first, len(cells), width)]
-        grid = [(row[0][0], [cell for _, cell in row]) for row in rows]
+        starts = range(first, len(cells), width)
+        grid = [(cells[k][0], [cell for _, cell in cells[k : k + width]]) for k in starts]
         if is_printed_table(grid[0][1]):
             end = next((k for k, (_, row) in enumerate(grid) if k and not (len(row) == width and _numeric(row))), None)
             if end and re.fullmatch(r"[-\d.]+", grid[end][1][0]):
@@ -349,14 +349,15 @@ def _with_offsets(path: Path, text: str, grid: Grid) -> Grid:
     """A program's table with a list of offsets that stands by itself as a column, if no theta is in the table."""
     (line, header), *rows = grid
     for listed in _OFFSETS.finditer(text):
-        cells = re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))
-        of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle")) and f"- {listed[1]}" not in text
-        if len(cells) == len(rows) and "offset" not in quantities_of(header):
-            if not of_angles or "theta" in quantities_of(header):
-                place = f"line {text.count(chr(10), 0, listed.start()) + 1}"
-                problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
-                raise InputError(path, place, problem, "Add them to theta, or remove that line")
-            header, rows = [*header, "offset"], [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
+        cells, quantities = re.split(r"[,;\s]+", listed[2].strip(" ,;\n")), quantities_of(header)
+        if len(cells) != len(rows) or "offset" in quantities:
+            continue
+        of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle"))
+        if "theta" in quantities or not of_angles or f"- {listed[1]}" in text:
+            problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
+            place = f"line {text.count(chr(10), 0, listed.start()) + 1}"
+            raise InputError(path, place, problem, "Add them to theta, or remove that line")
+        header, rows = [*header, "offset"], [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
     return [(line, header), *rows]
 
 
@@ -533,9 +534,10 @@ class _Table:
         variable although others have one, or at an end if it alone has no number in its name."""
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
         if k is not None:
-            if all(cells[k].strip() == "1" for _, cells in self.rows):
+            types = [cells[k].strip().lower() for _, cells in self.rows]
+            if {*types} == {"1"}:
                 self._refuse(None, k, "1 may be a joint that turns or one that slides", "Write revolute or prismatic")
-            return [_KINDS.get(cells[k].strip().lower(), cells[k].strip().lower()) for _, cells in self.rows]
+            return [_KINDS.get(each, each) for each in types]
         turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
         blank = [each is None for each in self._of("theta")]  # which says nothing of what moves
         starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]
@@ -555,9 +557,9 @@ class _Table:
                 kind = "revolute"
             elif slides[row] and (starred[row] or any(turns)):
                 kind = "prismatic"
-            said = _BY_NAME.search(name)
-            if said and (_KINDS[said[1].lower()] == "prismatic") != (kind == "prismatic"):
-                problem = f"'{name}' is {_KINDS[said[1].lower()]} by its name, and {kind} by its variable"
+            said = _BY_NAME.search(name.lower())
+            if said and ("p" in said[1]) != (kind == "prismatic"):
+                problem = f"'{name}' is {_KINDS[said[1]]} by its name, and {kind} by its variable"
                 self._refuse(row, self.column["joint"], problem, "Write the variable into theta or d")
             found.append(kind)
         still = next((row for row in range(len(found)) if found[row : row + 3] == ["fixed"] * 3), None)

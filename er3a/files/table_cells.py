@@ -139,9 +139,9 @@ def _delimited(text: str, mark: str) -> Grid:
 
 def _spaced(line: str, mark: str) -> list[str]:
     """Cells with blanks between them; a unit, an index and a sum stay together."""
-    line = re.sub(r"\[\s*([^\]]*?)\s*\]", lambda found: "[" + re.sub(r"\s", "", found[1]) + "]", line.strip())
+    brackets = r"\[[^\]]*\]|(?<=[\w*°)])\s*\([^()]*\)"
+    line = re.sub(brackets, lambda found: re.sub(r"\s", "", found[0]), line.strip())
     line = re.sub(rf"\s*([(\[]\s*{_UNIT}\s*[)\]])", r"\1", line)
-    line = re.sub(r"(?<=[\w*°)])\s*\(\s*([^()]*?)\s*\)", lambda found: "(" + found[1].replace(" ", "") + ")", line)
     line = re.sub(r"^(joint|link|axis|gelenk|achse)\s+(\d+|[ij#]|no\.?)\b[.:]?", r"\1\2", line, flags=re.I)
     line = re.sub(r"(?<=[\w°*)])\s+([-+/*])\s+(?=[\w(.])", r"\1", line)
     return re.split(r"\s{2,}|\t", line) if mark == "  " else line.split()

@@ -174,9 +174,7 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*$", group.before)
     name = found[1] if found else ""
     in_table = (
-        name and _matrix(code, group)
-        if is_matrix
-        else _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
+        _matrix(code, group) if is_matrix else _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
     )
     if not in_table or not group.inside.strip():
         return
@@ -250,16 +248,15 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
         code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
     _assigned(code, rows)
-    texts = [cell for row in rows for cell in _constants(row.cells)]
     if len(rows) > records and (re.search(_ADDED, code.text) or len(rows) == 1 or runs):
-        code.refuse(rows[0].place, ", ".join(texts), *_OF_LOOP)
+        code.refuse(rows[0].place, ", ".join(_constants(rows[0].cells)), *_OF_LOOP)
     names = {row.name: row for row in rows}
     chosen = [row_cells(each.inside) for each in code.groups if each.bracket == "["]
     arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
-    held = [each for each in held if len(each) > 1]
     taken = [row for each in arms for row in each]
-    held = [each for one in held or [rows] for each in _begun_again(one)]
+    several = [each for each in held if len(each) > 1] or [rows]
+    held = [each for one in several for each in _begun_again(one)]
     arms += [each for each in held if not taken or (_list_of(each[0]) and each[0] not in taken)]
     return [_grid([(code.line(row.place), row.cells) for row in each]) for each in arms if each], runs
 
@@ -376,7 +373,7 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         alike = sorted(map(_place, quantities_of(names))) == ["a", "alpha", "d", "theta"]
-        if not alike and named and each.bracket == "(" and _OF_ROWS.fullmatch(named[1]) and len(names) == 4:
+        if not alike and named and _OF_ROWS.fullmatch(named[1]) and len(names) == 4:
             names = code.order_near(code.line(each.start), code.line(each.start), 4)
             alike = bool(names)
         if alike and named and each.bracket != "{":
@@ -484,10 +481,13 @@ def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[
     slides |= function == "link" and "theta" in cells and "d" not in cells
     offset = cells.pop("offset", "0")
     row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
-    row |= {"offset": "" if slides else offset, "type": "prismatic" if slides else "revolute"}
-    if slides:
-        row["d"] = offset  # its own d is no part of the transform
-    row["convention"] = "modified" if re.search("mod|mdh", said) else "standard"
+    row |= {
+        "offset": offset,
+        "type": "revolute",
+        "convention": "modified" if "mod" in said or "mdh" in said else "standard",
+    }
+    if slides:  # its own d is no part of the transform
+        row |= {"d": offset, "offset": "", "type": "prismatic"}
     return row | {"direction": "-1"} if "flip" in words else row
 
 
