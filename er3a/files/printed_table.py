@@ -13,7 +13,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -247,11 +247,10 @@ def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
             break
         try:
             tables = [_with_names(table) for grid in read() for table in _headed(grid, columns)]
+            found += [(tables, kind == "program")] if tables else []
         except InputError:
             if not found:
                 raise
-        else:
-            found += [(tables, kind == "program")] if tables else []
     if not found and (bare := code_grids(text, headed=False)):
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
@@ -266,7 +265,7 @@ def _readers(text: str, columns: Sequence[str]) -> Iterator[tuple[Callable[[], l
     yield lambda: html_grids(text) or latex_grids(text), "marks"
     yield lambda: code_grids(text), "program"
     for mark, grid in line_grids(text):
-        yield lambda grid=grid: [grid], "marks" if mark == MARKS[0] else "lines"
+        yield partial(list, [grid]), "marks" if mark == MARKS[0] else "lines"
     yield lambda: _stacked(text), "lines"
 
 
