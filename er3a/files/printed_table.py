@@ -124,8 +124,12 @@ def check_size(path: Path, lines: Lines) -> None:
         with the number of rows
     """
     if len(lines) > MOST_LINES:
-        problem = f"{len(lines) - 1:,} rows are no arm's table"
-        raise InputError(path, None, problem, f"er3a models 1 to {MAX_JOINTS} joints: write one row for each")
+        raise InputError(
+            path,
+            None,
+            f"{len(lines) - 1:,} rows are no arm's table",
+            f"er3a models 1 to {MAX_JOINTS} joints: write one row for each",
+        )
 
 
 def table_text(path: Path) -> str:
@@ -188,8 +192,8 @@ def _differ(one: Grid, other: Grid) -> bool:
     """Whether each of two tables has a length that the other lacks, in whatever unit: their digits are compared."""
     found = []
     for (_, header), *rows in (one, other):
-        lengths = [k for k, name in enumerate(header) if {"a", "d"}.intersection(quantities_of([name]))]
-        cells = " ".join(row[k] for _, row in rows for k in lengths if k < len(row))
+        pairs = (pair for _, row in rows for pair in zip(header, row))
+        cells = " ".join(cell for name, cell in pairs if {"a", "d"}.intersection(quantities_of([name])))
         found.append({each.strip("0") for each in re.findall(r"(?<!\w)\d+", cells.replace(".", ""))})
     return bool(found[0] - found[1] and found[1] - found[0])
 
@@ -243,11 +247,10 @@ def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
             break
         try:
             tables = [_with_names(table) for grid in read() for table in _headed(grid, columns)]
+            found += [(tables, kind == "program")] if tables else []
         except InputError:
             if not found:
                 raise
-        else:
-            found += [(tables, kind == "program")] if tables else []
     if not found and (bare := code_grids(text, headed=False)):
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
@@ -262,7 +265,7 @@ def _readers(text: str, columns: Sequence[str]) -> Iterator[tuple[Callable[[], l
     yield lambda: html_grids(text) or latex_grids(text), "marks"
     yield lambda: code_grids(text), "program"
     for mark, grid in line_grids(text):
-        yield partial(list, (grid,)), "marks" if mark == MARKS[0] else "lines"
+        yield partial(list, [grid]), "marks" if mark == MARKS[0] else "lines"
     yield lambda: _stacked(text), "lines"
 
 
@@ -278,8 +281,12 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
         if titled and columns and len(cells) != width:
             if width in (len(other) for _, other in grid):
                 continue
-            problem = f"--column names {width} columns, and the table has {len(cells)}"
-            raise InputError(None, f"line {line}", problem, "Name each, - for one that is not read")
+            raise InputError(
+                None,
+                f"line {line}",
+                f"--column names {width} columns, and the table has {len(cells)}",
+                "Name each, - for one that is not read",
+            )
         if titled or (columns and len(cells) == width and not tables and _numeric(cells)):
             tables.append([(line, list(columns) or cells)])
             if not titled:
@@ -289,8 +296,7 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
             filled = [cell for cell in cells if cell]
             header = tables[-1][0][1]
             if len(tables[-1]) == 1 and filled and all(map(_unit_in, filled)) and len(cells) == len(header):
-                units = map(_unit_in, cells)
-                tables[-1][0] = line, [f"{name} [{unit}]" for name, unit in zip(header, units)]
+                tables[-1][0] = line, [f"{name} [{unit}]" for name, unit in zip(header, map(_unit_in, cells))]
             elif len(filled) < 2 or all("=" in cell for cell in filled):
                 broken = line
             elif not _numeric(filled) and (broken or len(cells) != len(header)):
@@ -325,8 +331,8 @@ def _stacked(text: str) -> list[Grid]:
     titles = "".join("t" if heading_of(cell) else " " for _, cell in cells)
     for found in re.finditer("t{4,}", titles):
         width, first = len(found[0]), found.start()
-        rows = [cells[k : k + width] for k in range(first, len(cells), width)]
-        grid = [(row[0][0], [cell for _, cell in row]) for row in rows]
+        starts = range(first, len(cells), width)
+        grid = [(cells[k][0], [cell for _, cell in cells[k : k + width]]) for k in starts]
         if is_printed_table(grid[0][1]):
             end = next((k for k, (_, row) in enumerate(grid) if k and not (len(row) == width and _numeric(row))), None)
             if end and re.fullmatch(r"[-\d.]+", grid[end][1][0]):
@@ -346,17 +352,18 @@ def _turned(grid: Grid) -> list[Grid]:
 
 
 def _with_offsets(path: Path, text: str, grid: Grid) -> Grid:
-    """A program's table with a list of offsets that stands by itself as a column, if no theta is in the table."""
+    """A program's table with a separate list of offsets as a column, if no theta is in the table."""
     (line, header), *rows = grid
     for listed in _OFFSETS.finditer(text):
-        cells = re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))
-        of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle")) and f"- {listed[1]}" not in text
-        if len(cells) == len(rows) and "offset" not in quantities_of(header):
-            if not of_angles or "theta" in quantities_of(header):
-                place = f"line {text.count(chr(10), 0, listed.start()) + 1}"
-                problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
-                raise InputError(path, place, problem, "Add them to theta, or remove that line")
-            header, rows = [*header, "offset"], [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
+        cells, quantities = re.split(r"[,;\s]+", listed[2].strip(" ,;\n")), quantities_of(header)
+        if len(cells) != len(rows) or "offset" in quantities:
+            continue
+        of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle"))
+        if "theta" in quantities or not of_angles or f"- {listed[1]}" in text:
+            problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
+            place = f"line {text.count(chr(10), 0, listed.start()) + 1}"
+            raise InputError(path, place, problem, "Add them to theta, or remove that line")
+        header, rows = [*header, "offset"], [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
     return [(line, header), *rows]
 
 
@@ -391,8 +398,7 @@ class _Table:
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
-            problem = f"'{kind[0]}' is no column of the table"
-            raise InputError(path, "types of joints", problem, "Add a column of types")
+            raise InputError(path, "types of joints", f"'{kind[0]}' is no column of the table", "Add a column of types")
         self.columns: dict[str, list[str]] = {"joint": self._joints()}
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
@@ -404,12 +410,20 @@ class _Table:
         for k, own in self.headings.items():
             if k != self.column[own.quantity]:
                 other = self.header[self.column[own.quantity]]
-                remedy = "Say what the columns are, - for one that is not read: --column joint,theta,d,a,alpha"
-                self._refuse(None, k, f"it and column '{other}' both mean {own.quantity}", remedy)
+                self._refuse(
+                    None,
+                    k,
+                    f"it and column '{other}' both mean {own.quantity}",
+                    "Say what the columns are, - for one that is not read: --column joint,theta,d,a,alpha",
+                )
         signs = [own.sign if own.sign in ("d", "r") else own.quantity for own in self.headings.values()]
         if [each for each in signs if each in ("alpha", "d", "r")] == ["alpha", "d", "r"] and signs[0] != "theta":
-            remedy = "Say which by --column: a for d and d for r (Khalil), or d for d and a for r"
-            self._refuse(None, self.column["a"], "columns d and r: either can be the link's length", remedy)
+            self._refuse(
+                None,
+                self.column["a"],
+                "columns d and r: either can be the link's length",
+                "Say which by --column: a for d and d for r (Khalil), or d for d and a for r",
+            )
 
     def _stated(self, program: str, text: str) -> Convention | None:
         """The convention that headings, the program, or the text around the table says, a program before words."""
@@ -476,8 +490,9 @@ class _Table:
                     *self.column,
                     *self.header,
                 }:
-                    remedy = "Say so by --column: type, or - if it is not read"
-                    self._refuse(None, k, "0 and 1 may be types of joints", remedy)
+                    self._refuse(
+                        None, k, "0 and 1 may be types of joints", "Say so by --column: type, or - if it is not read"
+                    )
         signs = [self._variable(row)[1] for row in range(len(self.rows))]
         if min(signs) < 0:
             if "direction" in self.header:
@@ -498,8 +513,12 @@ class _Table:
         commas = [found for cell in cells if (found := _COMMA.fullmatch(cell.strip()))]
         thousands = [found[0] for found in commas if len(found[2]) == 3 and found[1].strip("+-") != "0"]
         if thousands and len(thousands) == len(commas):
-            remedy = "Write a number with a point before decimals and nothing between thousands"
-            self._refuse(None, k, f"'{thousands[0]}' is not a number", remedy)
+            self._refuse(
+                None,
+                k,
+                f"'{thousands[0]}' is not a number",
+                "Write a number with a point before decimals and nothing between thousands",
+            )
         cells = [_COMMA.sub(r"\1.\2\3", cell) for cell in cells] if commas else cells
         return [self._amount(row, k, cell) for row, cell in enumerate(cells)]
 
@@ -515,8 +534,12 @@ class _Table:
         try:
             found = amount_of(text, given)
         except ValueError as error:
-            remedy = "Write a number without a unit, or arithmetic with pi and names whose values are given"
-            self._refuse(row, k, f"'{cell}' {error}", remedy)
+            self._refuse(
+                row,
+                k,
+                f"'{cell}' {error}",
+                "Write a number without a unit, or arithmetic with pi and names whose values are given",
+            )
         names = {name: times for name, times in found.variables.items() if times}
         if len(names) > 1:
             self._refuse(row, k, f"'{cell}' holds two variables", f"Give a value: {min(names)} = ... below the table")
@@ -533,37 +556,52 @@ class _Table:
         variable although others have one, or at an end if it alone has no number in its name."""
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
         if k is not None:
-            if all(cells[k].strip() == "1" for _, cells in self.rows):
+            types = [cells[k].strip().lower() for _, cells in self.rows]
+            if {*types} == {"1"}:
                 self._refuse(None, k, "1 may be a joint that turns or one that slides", "Write revolute or prismatic")
-            return [_KINDS.get(cells[k].strip().lower(), cells[k].strip().lower()) for _, cells in self.rows]
+            return [_KINDS.get(each, each) for each in types]
         turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
         blank = [each is None for each in self._of("theta")]  # which says nothing of what moves
         starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]
         moving = any(turns) or any(starred)
         zeros = [bool(each and not each.number) for each in self._of("theta")]
         if not moving and any(blank) and any(zeros):
-            problem = "0 among blank cells may be a joint, or a row where nothing moves"
-            self._refuse(zeros.index(True), self.column["theta"], problem, "Write q1, q2, ... where a joint turns")
-        names = [cells[self.column["joint"]].strip() if "joint" in self.column else "" for _, cells in self.rows]
-        ends = {row for row, name in enumerate(names) if not _NUMBERED.search(name) or "fixed" in name.lower()}
+            self._refuse(
+                zeros.index(True),
+                self.column["theta"],
+                "0 among blank cells may be a joint, or a row where nothing moves",
+                "Write q1, q2, ... where a joint turns",
+            )
+        names = [
+            cells[self.column["joint"]].strip().lower() if "joint" in self.column else "" for _, cells in self.rows
+        ]
+        ends = {row for row, name in enumerate(names) if not _NUMBERED.search(name) or "fixed" in name}
         ends = ends if ends <= {0, len(names) - 1} and len(ends) < len(names) else set()
         found = []
         for row, name in enumerate(names):
-            kind = "tool" if _TOOL.search(name.lower()) else "fixed"
+            kind = "tool" if _TOOL.search(name) else "fixed"
             unsaid = blank[row] and not slides[row] and row not in ends
             if turns[row] or (unsaid if moving else not (row in ends and name)):
                 kind = "revolute"
             elif slides[row] and (starred[row] or any(turns)):
                 kind = "prismatic"
             said = _BY_NAME.search(name)
-            if said and (_KINDS[said[1].lower()] == "prismatic") != (kind == "prismatic"):
-                problem = f"'{name}' is {_KINDS[said[1].lower()]} by its name, and {kind} by its variable"
-                self._refuse(row, self.column["joint"], problem, "Write the variable into theta or d")
+            if said and ("p" in said[1]) != (kind == "prismatic"):
+                self._refuse(
+                    row,
+                    self.column["joint"],
+                    f"'{name}' is {_KINDS[said[1]]} by its name, and {kind} by its variable",
+                    "Write the variable into theta or d",
+                )
             found.append(kind)
         still = next((row for row in range(len(found)) if found[row : row + 3] == ["fixed"] * 3), None)
         if still is not None:
-            remedy = "Write q1, q2, ... where a joint turns, and one row for what is fixed"
-            self._refuse(still, self.column["theta"], "three rows without a variable may be joints", remedy)
+            self._refuse(
+                still,
+                self.column["theta"],
+                "three rows without a variable may be joints",
+                "Write q1, q2, ... where a joint turns, and one row for what is fixed",
+            )
         return found
 
     def _of(self, quantity: str) -> list[CellAmount | None]:
@@ -609,8 +647,12 @@ class _Table:
         """A column of constants; a sliding joint's d keeps the constant beside its variable."""
         for row, (found, kind) in enumerate(zip(self.amounts[quantity], self.kinds)):
             if found and found.variables and not (quantity == "d" and kind == "prismatic"):
-                problem = f"'{min(found.variables)}' has no value"
-                self._refuse(row, k, problem, f"Write {min(found.variables)} = ... below the table")
+                self._refuse(
+                    row,
+                    k,
+                    f"'{min(found.variables)}' has no value",
+                    f"Write {min(found.variables)} = ... below the table",
+                )
         self._add(k, quantity, self.amounts[quantity])
 
     def _theta(self, k: int) -> None:
@@ -627,8 +669,12 @@ class _Table:
             if offsets:
                 self.notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
         elif offsets:
-            remedy = "Add it to the offset, or leave it out if the table is the Robotics Toolbox's, which ignores it"
-            self._refuse(None, k, f"{offsets[0]}, and there are offsets too", remedy)
+            self._refuse(
+                None,
+                k,
+                f"{offsets[0]}, and there are offsets too",
+                "Add it to the offset, or leave it out if the table is the Robotics Toolbox's, which ignores it",
+            )
         if any(sliding):
             self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])
 
@@ -637,8 +683,12 @@ class _Table:
         for row, each in enumerate(self.amounts["theta"]):
             right = {"deg": (90.0,), "rad": (math.pi / 2,)}.get(each.unit, (90.0, math.pi / 2)) if each else ()
             if each and all(abs(math.remainder(each.number, quarter)) > RIGHT_WITHIN for quarter in right):
-                remedy = "Say so by --column: offset if theta = q + offset, or - if it is a pose"
-                self._refuse(row, k, f"'{self.rows[row][1][k]}' may be an offset, or the angle of a pose", remedy)
+                self._refuse(
+                    row,
+                    k,
+                    f"'{self.rows[row][1][k]}' may be an offset, or the angle of a pose",
+                    "Say so by --column: offset if theta = q + offset, or - if it is a pose",
+                )
 
     def _add(self, k: int, name: str, found: list[CellAmount | None]) -> None:
         """A column of a quantity, in the unit that its heading or cells say; in mm or degrees if none do."""

@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Iterator
+from html.parser import HTMLParser
 
 from er3a.files.arithmetic import plain, words_of
 
@@ -63,26 +64,46 @@ def without_latex(text: str) -> str:
     return re.sub(r"[{}]", "", text)
 
 
-_TABLE = re.compile(r"(?is)<table\b.*?(?:</table|$)")
-_ROW = re.compile(r"(?is)<tr\b.*?(?=<tr\b|</tr|</table|$)")
-_HTML_CELL = re.compile(r"(?is)<t[dh]\b(?:[^>]*colspan=\W?(\d{1,2})\b)?[^>]*>(.*?)(?=<t[dhr]\b|</t[dhr]|$)")
-_TAGS = (r"<br\b[^>]*>|\s+", " "), (r"<sup\b[^>]*>", "^"), (r"<[^>]*>", ""), (r"\^o", "°")
+class _Html(HTMLParser):
+    """Collects the tables of a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.grids: list[Grid] = []
+        self.inside = False
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag == "table":
+            self.grids.append([])
+        elif tag == "tr" and self.grids:
+            self.grids[-1].append((self.getpos()[0], []))
+        elif tag in ("td", "th") and self.grids and self.grids[-1]:
+            span = dict(attrs).get("colspan") or "1"
+            self.grids[-1][-1][1].extend([""] * (min(int(span), 20) if span.isdecimal() else 1))
+            self.inside = True
+        elif tag == "br":
+            self.handle_data(" ")
+        elif tag == "sup":
+            self.handle_data("^")
+
+    def handle_endtag(self, tag: str) -> None:
+        self.inside = self.inside and tag not in ("td", "th", "tr", "table")
+
+    def handle_data(self, data: str) -> None:
+        if self.inside and self.grids[-1][-1][1]:
+            self.grids[-1][-1][1][-1] += data
 
 
 def html_grids(text: str) -> list[Grid]:
     """The tables of an HTML page, each with its rows' lines; a cell over several columns is the last of them."""
-    found = []
-    for table in _TABLE.finditer(text):
-        grid: Grid = []
-        for row in _ROW.finditer(table[0]):
-            cells = list[str]()
-            for span, cell in _HTML_CELL.findall(row[0]):
-                for pattern, plainly in _TAGS:
-                    cell = re.sub(pattern, plainly, cell)
-                cells += [*[""] * (int(span or 1) - 1), cell.strip()]
-            grid.append((text.count("\n", 0, table.start() + row.start()) + 1, cells))
-        found.append(grid)
-    return found
+    if "<t" not in text.lower():
+        return []
+    page = _Html()
+    page.feed(text)
+    return [
+        [(line, [re.sub(r"\s+", " ", cell).strip().replace("^o", "°") for cell in row]) for line, row in grid]
+        for grid in page.grids
+    ]
 
 
 def latex_grids(text: str) -> list[Grid]:
@@ -139,9 +160,9 @@ def _delimited(text: str, mark: str) -> Grid:
 
 def _spaced(line: str, mark: str) -> list[str]:
     """Cells with blanks between them; a unit, an index and a sum stay together."""
-    line = re.sub(r"\[\s*([^\]]*?)\s*\]", lambda found: "[" + re.sub(r"\s", "", found[1]) + "]", line.strip())
+    brackets = r"\[[^\]]*\]|(?<=[\w*°)])\s*\([^()]*\)"
+    line = re.sub(brackets, lambda found: re.sub(r"\s", "", found[0]), line.strip())
     line = re.sub(rf"\s*([(\[]\s*{_UNIT}\s*[)\]])", r"\1", line)
-    line = re.sub(r"(?<=[\w*°)])\s*\(\s*([^()]*?)\s*\)", lambda found: "(" + found[1].replace(" ", "") + ")", line)
     line = re.sub(r"^(joint|link|axis|gelenk|achse)\s+(\d+|[ij#]|no\.?)\b[.:]?", r"\1\2", line, flags=re.I)
     line = re.sub(r"(?<=[\w°*)])\s+([-+/*])\s+(?=[\w(.])", r"\1", line)
     return re.split(r"\s{2,}|\t", line) if mark == "  " else line.split()

@@ -174,9 +174,7 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*$", group.before)
     name = found[1] if found else ""
     in_table = (
-        name and _matrix(code, group)
-        if is_matrix
-        else _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
+        _matrix(code, group) if is_matrix else _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
     )
     if not in_table or not group.inside.strip():
         return
@@ -250,18 +248,17 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
         code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
     _assigned(code, rows)
-    texts = [cell for row in rows for cell in _constants(row.cells)]
     if len(rows) > records and (re.search(_ADDED, code.text) or len(rows) == 1 or runs):
-        code.refuse(rows[0].place, ", ".join(texts), *_OF_LOOP)
+        code.refuse(rows[0].place, ", ".join(_constants(rows[0].cells)), *_OF_LOOP)
     names = {row.name: row for row in rows}
     chosen = [row_cells(each.inside) for each in code.groups if each.bracket == "["]
     arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
-    held = [each for each in held if len(each) > 1]
     taken = [row for each in arms for row in each]
-    held = [each for one in held or [rows] for each in _begun_again(one)]
+    several = [each for each in held if len(each) > 1] or [rows]
+    held = [each for one in several for each in _begun_again(one)]
     arms += [each for each in held if not taken or (_list_of(each[0]) and each[0] not in taken)]
-    return [_grid([(code.line(row.place), row.cells) for row in each]) for each in arms if each], runs
+    return [_grid([(code.line(row.place), row.cells) for row in each]) for each in arms], runs
 
 
 _OF_LOOP = ("is of a loop, or of another program", "Write a row for each joint")
@@ -314,7 +311,7 @@ def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
     if not runs or len(grids) > 1:
         return
     rows = len(grids[0]) - 1 if grids else 0
-    used = [int(found[2]) for each in runs for found in list(_ELEMENT.finditer(each.inside))[-1:] if found[2].isdigit()]
+    used = [int(number) for each in runs for _, number in _ELEMENT.findall(each.inside)[-1:] if number.isdigit()]
     one_by_one = used in (list(range(rows)), list(range(1, rows + 1))) and len(runs) == rows
     given = {name for name, part in _given_to(code, toolbox=True) if part != "0"}
     turns = (
@@ -356,8 +353,12 @@ def _segments(code: Code, rows: list[_Link], runs: list[CodeGroup]) -> None:
             if kinds == ["RotZ"] and any(each.start < run.start < each.end for run in runs):
                 continue
             if row is None or len(kinds) != 1:
-                remedy = "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out"
-                code.refuse(each.start, each.inside, "is no row of a table", remedy)
+                code.refuse(
+                    each.start,
+                    each.inside,
+                    "is no row of a table",
+                    "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out",
+                )
             row.cells.update(type=_KDL[kinds[0]], convention="standard")
 
 
@@ -375,11 +376,11 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     orders = {"DH": ["a", "alpha", "d", "offset"]} if "Frame::DH(" in code.text else {}
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
-        alike = sorted(map(_place, quantities_of(names))) == ["a", "alpha", "d", "theta"]
-        if not alike and named and each.bracket == "(" and _OF_ROWS.fullmatch(named[1]) and len(names) == 4:
-            names = code.order_near(code.line(each.start), code.line(each.start), 4)
-            alike = bool(names)
-        if alike and named and each.bracket != "{":
+        line = code.line(each.start)
+        if sorted(map(_place, quantities_of(names))) != ["a", "alpha", "d", "theta"]:
+            called = named and _OF_ROWS.fullmatch(named[1]) and len(names) == 4
+            names = code.order_near(line, line, 4) if called else []
+        if names and named and each.bracket != "{":
             made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
             orders.setdefault(made[-1] if made else "", names)
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
@@ -484,10 +485,13 @@ def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[
     slides |= function == "link" and "theta" in cells and "d" not in cells
     offset = cells.pop("offset", "0")
     row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
-    row |= {"offset": "" if slides else offset, "type": "prismatic" if slides else "revolute"}
-    if slides:
-        row["d"] = offset  # its own d is no part of the transform
-    row["convention"] = "modified" if re.search("mod|mdh", said) else "standard"
+    row |= {
+        "offset": offset,
+        "type": "revolute",
+        "convention": "modified" if "mod" in said or "mdh" in said else "standard",
+    }
+    if slides:  # its own d is no part of the transform
+        row |= {"d": offset, "offset": "", "type": "prismatic"}
     return row | {"direction": "-1"} if "flip" in words else row
 
 
@@ -595,16 +599,15 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
     of a library."""
     width = len(rows[0][1])
-    typed = [
-        ",".join(names)
-        for name, names in code.orders.items()
-        if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
-        or (name in code.fields and re.search(rf"\b{name}\b", before))
-    ]
     near = code.order_near(rows[-1][0] + 1, rows[0][0], width)
     used = _columns_in(
         [
-            *typed,
+            *(
+                ",".join(names)
+                for name, names in code.orders.items()
+                if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
+                or (name in code.fields and re.search(rf"\b{name}\b", before))
+            ),
             *_UNPACKED.findall(code.text),
             *_ENUM.findall(code.text),
             *_LISTED.findall(code.text),
@@ -613,14 +616,16 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
         width,
     )
     if near and used and [*map(_place, near)] != [*map(_place, used)]:
-        problem = f"a comment says {', '.join(near)}, and the program {', '.join(used)}"
-        raise InputError(None, f"line {rows[0][0]}", problem, "Say the columns' order by --column")
+        raise InputError(
+            None,
+            f"line {rows[0][0]}",
+            f"a comment says {', '.join(near)}, and the program {', '.join(used)}",
+            "Say the columns' order by --column",
+        )
     if said := near or used or _columns_in(code.comments.values(), width):
         return said
-    taken = (
-        order.split(",") for library, (order, _) in LIBRARIES.items() if re.search(library, code.text) and width >= 4
-    )
-    return next((names[:width] for names in taken), [])
+    taken = (order for library, (order, _) in LIBRARIES.items() if re.search(library, code.text) and width >= 4)
+    return next((order.split(",")[:width] for order in taken), [])
 
 
 def _place(name: str) -> str:
@@ -736,14 +741,22 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str,
         title = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
         _, first, place, other = columns.setdefault(quantity, (title, cells, line, name))
         if first != cells and quantity not in ("theta", "pose"):
-            problem = f"'{name}' is another list of {quantity} than '{other}' of line {place}"
-            raise InputError(None, f"line {line}", problem, "Give the lists of one arm, each with its own name")
+            raise InputError(
+                None,
+                f"line {line}",
+                f"'{name}' is another list of {quantity} than '{other}' of line {place}",
+                "Give the lists of one arm, each with its own name",
+            )
     if not {"a", "alpha", "d"} <= {*columns}:
         return []
     *_, place, name = columns.pop("pose", ("", 0, ""))
     if name and "theta" not in columns:
-        problem = f"'{name}' may be offsets of the joints' angles, or a pose"
-        raise InputError(None, f"line {place}", problem, "Name it offset if theta = q + offset, or remove it")
+        raise InputError(
+            None,
+            f"line {place}",
+            f"'{name}' may be offsets of the joints' angles, or a pose",
+            "Name it offset if theta = q + offset, or remove it",
+        )
     titles, lengths, places, _ = zip(*columns.values())
     if len({*map(len, lengths)}) > 1:
         entries = ", ".join(f"{name} {len(cells)}" for name, (_, cells, _, _) in columns.items())
