@@ -18,7 +18,15 @@ from er3a.files.kept_files import write_atomically
 from er3a.pipeline import language
 from er3a.pipeline.messages.say import joined, say_all, sentence
 from er3a.pipeline.messages.scope import assumed_text, covered_text, missed_text
-from er3a.pipeline.results import Status, changed_since, is_computed, read_scope, read_status
+from er3a.pipeline.results import (
+    Foundation,
+    Status,
+    changed_since,
+    is_computed,
+    read_foundation,
+    read_scope,
+    read_status,
+)
 from er3a.pipeline.scope import Coverage, Open
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -34,13 +42,14 @@ class StageVerdict:
     Attributes
     ----------
     status : ``not_examined`` where the stage has not been computed yet
-    code : of the finding; text : in English
+    code : of the finding; text : in English; answer : its first sentence
     demonstrations : how many targets, paths, programs or objects in it fail as they are meant to
     expected : what the study says that the status is to be, if it does
     checked : what each check covers; not_checked : why not all, in English; assumed : what they rest on, in English
     outdated : files that have changed since, "the study's settings" or "er3a itself": the verdict is none on what they
         are now
     said_by : the robot's stage whose caution names already all that keeps this one from a pass; empty if there is none
+    foundation : what validation found of the table that it rests on; a contradicted one lets nothing pass
     """
 
     robot: str
@@ -55,11 +64,17 @@ class StageVerdict:
     assumed: tuple[str, ...] = ()
     outdated: tuple[str, ...] = ()
     said_by: str = ""
+    answer: str = ""
+    foundation: Foundation | None = None
 
     @property
     def shown(self) -> str:
-        """The status in words, and whether it is as expected; of a caution that another stage explains, which one."""
-        status = f"see {self.said_by}" if self.said_by else self.status.replace("_", " ")
+        """The status in words, and whether it is as expected; which stage says more where it is another; none where the
+        table is contradicted."""
+        if self.foundation == "fail" and self.status in ("pass", "caution"):
+            return "no verdict"
+        by = self.said_by or ("validation" if self.foundation == "unsettled" and self.status == "pass" else "")
+        status = f"see {by}" if by else self.status.replace("_", " ")
         return status + ", as expected" * self.is_demonstration
 
     @property
@@ -79,8 +94,9 @@ class StageVerdict:
 
     @property
     def is_skipped(self) -> bool:
-        """Whether nothing was judged: not examined yet, no reference, or a stage that does not apply to the robot."""
-        absent = self.status in (NOT_EXAMINED, "no_reference", "not_computed")
+        """Whether nothing was judged: not examined yet, no reference, a stage that does not apply to the robot, or one
+        that would pass what rests on a contradicted table."""
+        absent = self.status in (NOT_EXAMINED, "no_reference", "not_computed") or self.shown == "no verdict"
         return absent and not (self.broken or self.is_otherwise)
 
     def counts(self, level: Level) -> bool:
@@ -132,12 +148,16 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str, said: dic
     if verdict.status == "caution" != expected:
         said |= {gap: Open("as_above", (name,)) for gap in fresh if gap}
     text = say_all(replace(verdict, missed=missed).findings)
+    answer = f"{text.partition('. ')[0].removesuffix('.')}."
+    below = folder.parent / "validation"
+    foundation = read_foundation(below) if stage.rests_on and is_computed(below) else None
     outdated = changed_since(folder, study, robot, name)
     if outdated:
         text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)
     return StageVerdict(
         *(robot, name, verdict.status, verdict.finding.code, text, shown, expected, summary.checked),
         *(tuple(map(missed_text, missed)), tuple(map(assumed_text, summary.assumed)), outdated, again or ""),
+        *(answer, foundation),
     )
 
 

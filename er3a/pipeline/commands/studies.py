@@ -155,17 +155,28 @@ def verdicts(
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
     fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for this verdict or a worse one")] = None,
+    every: Annotated[bool, typer.Option("--all", help="print all that was found, checked and not checked")] = False,
     as_json: options.AsJson = False,
 ):
-    """Print the verdict of each stage of each robot."""
+    """Print the verdict of each stage of each robot, and what to confirm before the arm moves."""
     from er3a.pipeline.verdicts import read_verdicts
+    from er3a.pipeline.viewing.conditions import condition_of
 
-    found = read_verdicts(load_study(study), results)
+    loaded = load_study(study)
+    found = read_verdicts(loaded, results)
     if as_json:
         options.print_json([asdict(verdict) for verdict in found])
     else:
-        rows = ((each.robot, each.stage, each.shown, each.text) for each in found)
+        wrong = {"no verdict": "The table is contradicted."}
+        rows = (
+            (each.robot, each.stage, each.shown, each.text if every else wrong.get(each.shown, each.answer))
+            for each in found
+        )
         options.print_table(("robot", "stage", "verdict", "finding"), rows)
+        for robot in loaded.names:
+            print(f"{robot}: {condition_of(results / robot / 'validation')}")
+        if changed := [*dict.fromkeys(name for each in found for name in each.outdated)]:
+            options.print_note(f"changed since ({', '.join(changed)}): run the study again")
     if fail_on:
         _end_with_findings(found, fail_on)
 
