@@ -170,8 +170,9 @@ def study():
     return Study.model_validate(content)
 
 
+@pytest.mark.parametrize("lone", ["scene_collision", "rates"])
 @pytest.mark.parametrize("expect", [{}, {"workspace": "caution"}])
-def test_what_several_stages_do_not_cover_is_one_caution(study, monkeypatch, expect):
+def test_what_several_stages_do_not_cover_is_one_caution(study, monkeypatch, expect, lone):
     """One that finds more itself, or of which the first was expected, is a caution all the same."""
     limits, path = Open("limits_assumed", ("j1",)), Open("not_followed", ("line",))
     gaps = {"workspace": [limits], "collision": [limits], "inverse": [limits], "trajectory": [limits, path]}
@@ -179,6 +180,7 @@ def test_what_several_stages_do_not_cover_is_one_caution(study, monkeypatch, exp
     def scope(_, stage):
         verdict = Verdict("caution" if stage.name == "collision" else "pass", fact("not_checked", checks=()))
         covered = [Coverage(GAPS[each.reason], 0, 6, (each,)) for each in gaps.get(stage.name, ())]
+        covered += [Coverage(lone, 4, 6)] * (stage.name == "inverse")
         summary = Summary(verdict, (), checked=tuple(covered))
         return replace(summary, figures=())  # made anew, as when it is read from its file
 
@@ -189,8 +191,10 @@ def test_what_several_stages_do_not_cover_is_one_caution(study, monkeypatch, exp
     found = {each.stage: each for each in read_verdicts(study, Path())}
     assert [each.status for each in found.values()] == ["pass", *["caution"] * 4, "pass"]
     first = "collision" if expect else "workspace"
-    assert {stage for stage, each in found.items() if each.counts("caution")} == {first, "collision", "trajectory"}
-    assert {stage: each.said_by for stage, each in found.items() if each.said_by} == {"inverse": first}
+    own = {first, "collision", "trajectory", *["inverse"] * (lone == "rates")}
+    assert {stage for stage, each in found.items() if each.counts("caution")} == own
+    said = {stage: each.said_by for stage, each in found.items() if each.said_by}
+    assert said == ({"inverse": first} if lone == "scene_collision" else {})
     assert [stage for stage, each in found.items() if "j1" in each.text] == list(dict.fromkeys(["workspace", first]))
     assert all(found[stage].text.count(f"as above ({first})") == 1 for stage in ("inverse", "trajectory"))
     assert "line" in found["trajectory"].text

@@ -497,7 +497,7 @@ def depth_inside(body: Body, other: Body, T: Reals) -> float:
 def _depths_in(body: Body, points: Reals) -> Reals:
     if body.tree is not None:
         found = np.zeros(len(points))
-        depths_inside(trees_of([body.tree]), 0, np.ascontiguousarray(points), found)
+        depths_inside(trees_of([body.tree, None]), np.ascontiguousarray(points), found)
         return found
     if body.kind == HALF_SPACE:
         return np.asarray(body.points[1, 0] - points @ body.points[0])

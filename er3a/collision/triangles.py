@@ -1,9 +1,11 @@
 """Surfaces of triangles: trees of boxes around them, distances, and what lies inside closed ones, compiled.
 
 A tree halves the triangles of a surface along the longest side of their middles' box, until each box holds one
-triangle. Two surfaces are measured by descending both trees at once, the nearer boxes first; boxes that are farther
-apart than what was found are left out. The distance of two boxes is bounded from below by the box of one that holds
-the other, in either's axes [1]_. Two triangles are measured as convex cores, and so is a triangle with a convex body.
+triangle. A box lies along the principal axes of what it holds, and so is as thin as that: housings that turn in each
+other are near over a wide area. Two surfaces are measured by descending both trees at once, the nearer boxes first;
+boxes that are farther apart than what was found are left out. The distance of two boxes is bounded from below by the
+box of one that holds the other, in either's axes [1]_. Two triangles are measured as convex cores, and so is a triangle
+with a convex body.
 
 A surface may consist of many shells. A point is inside if a ray from it crosses one of the closed shells an odd number
 of times. What does not cross a surface, but has a point of one of its shells inside, is inside as a whole.
@@ -30,7 +32,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 40 levels deep
-PROBES = 8  # outermost points of a surface, besides one of each shell, that are looked for inside others
+PROBES = 4  # outermost points of a surface, besides one of each shell, that are looked for inside others
 FIRST = 14  # corners, with which the choice of few of a hull begins
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
@@ -41,7 +43,8 @@ class TriangleTree(ByValue):
 
     Attributes
     ----------
-    box : (M, 2, 3), m, middle and half the edges of each box; the first holds all
+    box : (M, 2, 3), m, middle and half the edges of a box along the frame's axes; the first holds all
+    slim : (M, 5, 3), m, the same of a box along the principal axes of what the other holds, and these axes
     child : (M, 2), the two boxes in a box; of the box of one triangle -1 and the triangle's number
     corner : (F, 3, 3), m
     shell : (F,), a number of the closed shell that a triangle belongs to, 0 for one that is not closed
@@ -49,6 +52,7 @@ class TriangleTree(ByValue):
     """
 
     box: Reals
+    slim: Reals
     child: Integers
     corner: Reals
     shell: Integers
@@ -63,6 +67,7 @@ class Trees(NamedTuple):
 
     root: Integers
     box: Reals
+    slim: Reals
     child: Integers
     corner: Reals
     shell: Integers
@@ -89,15 +94,21 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
     number, shell = _shells(faces, len(points))
     outermost = faces.ravel()[(fibonacci_sphere(PROBES) @ points[faces.ravel()].T).argmax(axis=1)]
     probe = points[np.r_[faces[np.unique(number, return_index=True)[1], 0], outermost]]
-    low, high = corner.min(axis=1), corner.max(axis=1)
     order, middle = np.arange(len(faces)), corner.mean(axis=1)
+    size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)[:, None]
+    squares = np.einsum("fki,fkj->fij", corner, corner).reshape(-1, 9)
+    moments = (size + np.finfo(float).tiny) * np.concatenate([squares, middle, np.ones_like(size)], axis=1)
     starts, ends = np.array([0]), np.array([len(faces)])
-    boxes, children = list[Reals](), list[Integers]()
+    boxes, slims, children = list[Reals](), list[Reals](), list[Integers]()
     count = 1
     while len(starts):
-        lower, upper = (bound.reduceat(rows[order], starts) for bound, rows in ((np.minimum, low), (np.maximum, high)))
-        boxes.append(np.stack([(lower + upper) / 2, (upper - lower) / 2], axis=1))
-        sizes, open_ = ends - starts, ends - starts > 1
+        sums, sizes, open_ = np.add.reduceat(moments[order], starts), ends - starts, ends - starts > 1
+        mean = sums[:, 9:12] / sums[:, 12:]
+        about = sums[:, :9].reshape(-1, 3, 3) / sums[:, 12:, None] - 3 * mean[:, :, None] * mean[:, None]
+        axes = np.linalg.eigh(about)[1].swapaxes(1, 2)
+        boxes.append(_bounds(corner[order], starts))
+        slim = _bounds(np.einsum("fki,fai->fka", corner[order], np.repeat(axes, sizes, axis=0)), starts)
+        slims.append(np.concatenate([slim[:, :1] @ axes, slim[:, 1:], axes], axis=1))
         child = np.stack([np.full(len(starts), -1), order[starts]], axis=1)
         child[open_] = count + np.arange(2 * int(open_.sum())).reshape(-1, 2)
         children.append(child)
@@ -112,7 +123,14 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
         cut = begin + sizes // 2
         starts = np.stack([begin, cut], axis=1).ravel()
         ends = np.stack([cut, begin + sizes], axis=1).ravel()
-    return TriangleTree(np.concatenate(boxes), np.concatenate(children), corner, shell, probe)
+    trees = np.concatenate(boxes), np.concatenate(slims), np.concatenate(children)
+    return TriangleTree(*trees, corner, shell, probe)
+
+
+def _bounds(corner: Reals, starts: Integers) -> Reals:
+    """Middle and half the edges (n, 2, 3) of boxes around triangles (F, 3, 3), each from one of ``starts`` on."""
+    lower, upper = (bound.reduceat(bound.reduce(corner, axis=1), starts) for bound in (np.minimum, np.maximum))
+    return np.stack([(lower + upper) / 2, (upper - lower) / 2], axis=1)
 
 
 def _shells(faces: Integers, points: int) -> tuple[Integers, Integers]:
@@ -192,7 +210,7 @@ def trees_of(trees: Sequence[TriangleTree | None]) -> Trees:
         np.array([bounds[k + more] if k >= 0 else -1 for k in number], np.int64)
         for bounds, more in ((sizes[0], 0), (sizes[2], 0), (sizes[2], 1))
     )
-    none = {"box": (0, 2, 3), "corner": (0, 3, 3), "probe": (0, 3), "shell": (0,)}
+    none = {"box": (0, 2, 3), "slim": (0, 5, 3), "corner": (0, 3, 3), "probe": (0, 3), "shell": (0,)}
     joined = {
         key: np.concatenate([getattr(tree, key) for tree in kept]) if kept else np.empty(shape, float)
         for key, shape in none.items()
@@ -214,50 +232,51 @@ def _turned(T: Reals, S: Reals, R: Reals, t: Reals) -> None:
 
 
 @inlined_kernel
-def _boxes_apart(first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals, axis: Reals, limit: float) -> float:
-    """A lower bound of the squared distance of a box of ``first`` (M, 2, 3) and one of ``second``, seen from the first
-    by R (3, 3) and t (3,); one that reaches ``limit`` will do.
-
-    ``axis`` (2, 3), the direction that kept others apart, in either's axes, is tried besides.
-    """
+def _boxes_apart(first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals, limit: float) -> float:
+    """A lower bound of the squared distance of a box of ``first`` (M, 5, 3) and one of ``second``, seen from the first
+    by R (3, 3) and t (3,); one that reaches ``limit`` will do."""
     x, y, z = second[m, 0, 0], second[m, 0, 1], second[m, 0, 2]
-    i, j, k = second[m, 1, 0], second[m, 1, 1], second[m, 1, 2]
-    u, v, w = first[n, 1, 0], first[n, 1, 1], first[n, 1, 2]
     dx = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + t[0] - first[n, 0, 0]
     dy = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + t[1] - first[n, 0, 1]
     dz = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + t[2] - first[n, 0, 2]
-    gap = axis[0, 0] * dx + axis[0, 1] * dy + axis[0, 2] * dz
-    gap -= abs(axis[0, 0]) * u + abs(axis[0, 1]) * v + abs(axis[0, 2]) * w
-    gap -= abs(axis[1, 0]) * i + abs(axis[1, 1]) * j + abs(axis[1, 2]) * k
-    found = float(max(gap, 0.0) ** 2)
-    if found >= limit:
-        return found
-    a, b, c = abs(R[0, 0]), abs(R[0, 1]), abs(R[0, 2])
-    d, e, f = abs(R[1, 0]), abs(R[1, 1]), abs(R[1, 2])
-    g, h, o = abs(R[2, 0]), abs(R[2, 1]), abs(R[2, 2])
-    apart = max(abs(dx) - u - a * i - b * j - c * k, 0.0) ** 2
-    apart += max(abs(dy) - v - d * i - e * j - f * k, 0.0) ** 2
-    apart += max(abs(dz) - w - g * i - h * j - o * k, 0.0) ** 2
-    found = float(max(found, apart))
-    if found >= limit:
-        return found
-    apart = max(abs(R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz) - i - a * u - d * v - g * w, 0.0) ** 2
-    apart += max(abs(R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz) - j - b * u - e * v - h * w, 0.0) ** 2
-    apart += max(abs(R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz) - k - c * u - f * v - o * w, 0.0) ** 2
-    return float(max(found, apart))
+    a, b, c = _turned_axis(second, m, 2, R)
+    d, e, f = _turned_axis(second, m, 3, R)
+    g, h, o = _turned_axis(second, m, 4, R)
+    i, j, k = second[m, 1, 0], second[m, 1, 1], second[m, 1, 2]
+    apart = reach_i = reach_j = reach_k = 0.0
+    for r in range(3):
+        x, y, z, half = first[n, r + 2, 0], first[n, r + 2, 1], first[n, r + 2, 2], first[n, 1, r]
+        u, v, w = abs(x * a + y * b + z * c), abs(x * d + y * e + z * f), abs(x * g + y * h + z * o)
+        apart += max(abs(x * dx + y * dy + z * dz) - half - u * i - v * j - w * k, 0.0) ** 2
+        if apart >= limit:
+            return float(apart)
+        reach_i, reach_j, reach_k = reach_i + u * half, reach_j + v * half, reach_k + w * half
+    other = max(abs(a * dx + b * dy + c * dz) - i - reach_i, 0.0) ** 2
+    other += max(abs(d * dx + e * dy + f * dz) - j - reach_j, 0.0) ** 2
+    other += max(abs(g * dx + h * dy + o * dz) - k - reach_k, 0.0) ** 2
+    return float(max(apart, other))
 
 
 @inlined_kernel
-def _keep_axis(near: Reals, R: Reals, axis: Reals) -> None:
-    """The direction from one nearest point to the other (2, 3), in the axes of both bodies."""
+def _turned_axis(boxes: Reals, n: int, row: int, R: Reals) -> tuple[float, float, float]:
+    """An axis of a box of (M, 5, 3), turned by R (3, 3)."""
+    x, y, z = boxes[n, row, 0], boxes[n, row, 1], boxes[n, row, 2]
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+    )
+
+
+@inlined_kernel
+def _keep_axis(near: Reals, axis: Reals) -> None:
+    """The direction (3,) from one nearest point to the other (2, 3)."""
     size = 0.0
     for r in range(3):
-        axis[0, r] = near[1, r] - near[0, r]
-        size += axis[0, r] ** 2
+        axis[r] = near[1, r] - near[0, r]
+        size += axis[r] ** 2
     for r in range(3):
-        axis[0, r] *= 1 / np.sqrt(size) if size > 0 else 0.0
-    for c in range(3):
-        axis[1, c] = R[0, c] * axis[0, 0] + R[1, c] * axis[0, 1] + R[2, c] * axis[0, 2]
+        axis[r] *= 1 / np.sqrt(size) if size > 0 else 0.0
 
 
 @inlined_kernel
@@ -265,7 +284,7 @@ def _apart_along(points: Reals, count: int, axis: Reals) -> float:
     """How far the points from row 3 on, ``count`` of them, are beyond the first three along an axis."""
     last, first = -np.inf, np.inf
     for p in range(3 + count):
-        along = points[p, 0] * axis[0, 0] + points[p, 1] * axis[0, 1] + points[p, 2] * axis[0, 2]
+        along = points[p, 0] * axis[0] + points[p, 1] * axis[1] + points[p, 2] * axis[2]
         if p < 3:
             last = max(last, along)
         else:
@@ -388,7 +407,7 @@ def surface_distance(  # noqa: C901, PLR0912
     T, S : (4, 4), m, place the two surfaces; S does not count for a core
     core : points (P, 3) in space, m, first and last row of the core (the last excluded), and the radius of its disc, m
     room : (ROOM, 3), scratch memory
-    near : (2, 3), m, holds the closest points of hulls around the two, and gets their own
+    near : (2, 3), m, gets their closest points, if they are nearer than ``far``
     far : m; of surfaces farther away any number from ``far`` to the distance may be returned
 
     Returns
@@ -398,34 +417,38 @@ def surface_distance(  # noqa: C901, PLR0912
     w, first, last, disc = core
     convex = trees.root[b] < 0
     count, disc = (last - first, disc) if convex else (3, 0.0)
-    points, R, t, boxes, nb = np.empty((3 + count, 3)), np.zeros((3, 3)), np.zeros(3), trees.box, trees.root[b]
+    points, R, t, boxes, nb = np.empty((3 + count, 3)), np.zeros((3, 3)), np.zeros(3), trees.slim, trees.root[b]
     within = False
     if convex:
-        boxes, nb = np.empty((1, 2, 3)), 0
+        boxes, nb = np.zeros((1, 5, 3)), 0
         _core_in_frame(T, core, R, points, boxes[0])
     else:
         within = _holds_probe(trees, T, S, a, b, t) or _holds_probe(trees, S, T, b, a, t)
         if within and far <= 0:  # only whether they overlap is asked
             return 0.0
         _turned(T, S, R, t)
-    axis, close = np.empty((2, 3)), np.empty((2, 3))
-    start, other = int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
-    for k in range(2):
-        for r in range(3):
-            close[k, r] = T[0, r] * near[k, 0] + T[1, r] * near[k, 1] + T[2, r] * near[k, 2]
-    _keep_axis(close, R, axis)
+    axis, close, start, other = np.zeros(3), np.empty((2, 3)), int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
     stack, bound = np.empty((WAITING, 2), np.int64), np.empty(WAITING)
     stack[0, 0], stack[0, 1], bound[0] = trees.root[a], nb, 0.0
     height, best = 1, max(far, 2 * TOUCHING)
     while height:
         height -= 1
-        n, m = stack[height, 0], stack[height, 1]
+        n, m, kept = stack[height, 0], stack[height, 1], height
         if bound[height] >= best * best:
             continue
         deep_a, deep_b = trees.child[n, 0] >= 0, not convex and trees.child[m, 0] >= 0
-        if deep_a or deep_b:  # the larger one is opened
-            of_a = deep_a and not (deep_b and _girth(boxes[m]) >= _girth(trees.box[n]))
-            height = _open_boxes(trees, boxes, of_a, R, t, axis, best * best, stack, bound, height)
+        if deep_a or deep_b:  # the longer one is opened
+            of_a = deep_a and not (deep_b and boxes[m, 1, 2] >= trees.slim[n, 1, 2])
+            for side in range(2):
+                one, two = (trees.child[n, side], m) if of_a else (n, trees.child[m, side])
+                apart = _boxes_apart(trees.slim, one, boxes, two, R, t, best * best)
+                if apart < best * best:
+                    stack[height, 0], stack[height, 1], bound[height] = one, two, apart
+                    height += 1
+            if height == kept + 2 and bound[kept] < bound[kept + 1]:  # the nearer ones on top
+                for k in range(2):
+                    stack[kept, k], stack[kept + 1, k] = stack[kept + 1, k], stack[kept, k]
+                bound[kept], bound[kept + 1] = bound[kept + 1], bound[kept]
             continue
         for k in range(3):
             for r in range(3):
@@ -438,7 +461,7 @@ def surface_distance(  # noqa: C901, PLR0912
         if not convex and _beyond_plane(points, 3, 0, 3, best):
             continue
         distance = cores_distance(points, (start, other, other, other + count), 0.0, disc, room, close, best)
-        _keep_axis(close, R, axis)  # of any two triangles: it mostly separates their neighbours, too
+        _keep_axis(close, axis)  # of any two triangles: it mostly separates their neighbours, too
         if distance < best:
             best = distance
             for k in range(2):
@@ -453,7 +476,7 @@ def surface_distance(  # noqa: C901, PLR0912
 
 @inner_kernel
 def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], R: Reals, points: Reals, box: Reals) -> None:
-    """The points of a core in a surface's frame, from row 3 of ``points`` on, and the box (2, 3) around it; R becomes
+    """The points of a core in a surface's frame, from row 3 of ``points`` on, and the box (5, 3) around it; R becomes
     the identity."""
     w, first, last, disc = core
     for r in range(3):
@@ -464,43 +487,7 @@ def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], R: Reals, poin
                 value += T[k, r] * (w[first + p, k] - T[k, 3])
             points[3 + p, r] = value
             low, high = min(low, value), max(high, value)
-        box[0, r], box[1, r] = (low + high) / 2, (high - low) / 2 + disc
-
-
-@inlined_kernel
-def _girth(box: Reals) -> float:
-    """Half the sum of a box's edges."""
-    return float(box[1, 0] + box[1, 1] + box[1, 2])
-
-
-@inlined_kernel
-def _open_boxes(
-    trees: Trees,
-    boxes: Reals,
-    of_a: bool,
-    R: Reals,
-    t: Reals,
-    axis: Reals,
-    limit: float,
-    stack: Integers,
-    bound: Reals,
-    height: int,
-) -> int:
-    """Replace the pair of boxes at ``stack[height]`` by those of the two boxes in one of them that are nearer than the
-    root of ``limit``, the nearer one on top; returns the new height."""
-    n, m, kept = stack[height, 0], stack[height, 1], height
-    for side in range(2):
-        one = trees.child[n, side] if of_a else n
-        other = m if of_a else trees.child[m, side]
-        apart = _boxes_apart(trees.box, one, boxes, other, R, t, axis, limit)
-        if apart < limit:
-            stack[height, 0], stack[height, 1], bound[height] = one, other, apart
-            height += 1
-    if height == kept + 2 and bound[kept] < bound[kept + 1]:
-        for k in range(2):
-            stack[kept, k], stack[kept + 1, k] = stack[kept + 1, k], stack[kept, k]
-        bound[kept], bound[kept + 1] = bound[kept + 1], bound[kept]
-    return height
+        box[0, r], box[1, r], box[2 + r, r] = (low + high) / 2, (high - low) / 2 + disc, 1.0
 
 
 @inner_kernel
@@ -554,27 +541,17 @@ def surface_above_plane(
 
 
 @kernel
-def depths_inside(trees: Trees, body: int, points: Reals, found: Reals) -> None:
+def depths_inside(trees: Trees, points: Reals, found: Reals) -> None:
     """How deep points lie in a surface's closed shells.
 
     Parameters
     ----------
-    body : number of the body in ``trees``
+    trees : of the surface, and of a body that is convex
     points : (N, 3), m, in the body's frame
     found : (N,), gets the depths, m; 0 for points outside
     """
     T, room, near = np.eye(4), np.empty((ROOM, 3)), np.empty((2, 3))
-    alone = Trees(
-        np.array([trees.root[body], -1]),
-        trees.box,
-        trees.child,
-        trees.corner,
-        trees.shell,
-        trees.probe,
-        trees.first,
-        trees.last,
-    )
     for n in range(len(points)):
         found[n] = 0.0
-        if holds_point(trees, T, trees.root[body], points[n]):
-            found[n] = -surface_distance(alone, 0, T, 1, T, (points, n, n + 1, 0.0), room, near, np.inf)
+        if holds_point(trees, T, trees.root[0], points[n]):
+            found[n] = -surface_distance(trees, 0, T, 1, T, (points, n, n + 1, 0.0), room, near, np.inf)

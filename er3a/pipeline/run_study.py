@@ -62,9 +62,7 @@ def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path
             yield path, error
 
 
-SIGKILL = 9
 MARKS = {"pass": "✓", "caution": "!", "fail": "✗"}
-NO_VERDICT = "–"
 _JOB_ENDED = re.compile(r"2> (\S+)' (?:died with <Signals\.\w+: (\d+)>|returned non-zero exit status (\d+))")
 """How a job ended, of which a line of its own tells: its log, and the signal or the exit code."""
 
@@ -128,7 +126,7 @@ class RunLog(LogHandlerBase):
             job = record.__dict__
             name, logs = job.get("rule_msg") or job.get("rule_name"), [str(log) for log in job.get("log") or ()]
             number = self._killed.get(logs[0], 0) if logs else 0
-            reason = f"killed (signal {number}{'; out of memory?' * (number == SIGKILL)})"
+            reason = f"killed (signal {number}{'; out of memory?' * (number == 9)})"
             self._print(f"✗ {name}: {reason if number else 'ended with an error'}; see {', '.join(logs)}")
             if number and (log := Path(logs[0])).is_file():
                 with log.open("a", encoding="utf-8") as told:  # where reasons are looked for when the run has ended
@@ -153,7 +151,7 @@ class RunLog(LogHandlerBase):
             status = _verdict(robot, stage)
             note = ", as expected" if self.expected.get((robot, stage)) == status else ""
             took = f"{time.monotonic() - begun:.0f} s  ({self._left} jobs left)"
-            mark = MARKS.get(status, NO_VERDICT)
+            mark = MARKS.get(status, "–")
             self._print(f"{mark} {robot}  {stage:<10}  {status.replace('_', ' ')}{note}  {took}")
 
     def _print(self, line: str) -> None:
@@ -171,8 +169,7 @@ def _concerns_a_person(record: LogRecord) -> bool:
 def _error_line(text: str) -> str:
     """What Snakemake can't do, in one line; words that it was given and doesn't know are most often a study's file."""
     if unknown := re.search(r"^MissingRuleException:\s+No rule to produce (\S+)", text):
-        known = ", ".join(STAGES)
-        return f"error: {unknown[1]}: no stage ({known}) and no file that this study makes; a study is given by --study"
+        return f"error: {unknown[1]}: no stage ({', '.join(STAGES)}) or file of this one; a study is given by --study"
     return f"error: {' '.join(text.split())}"
 
 
@@ -187,7 +184,6 @@ def _verdict(robot: str, stage: str) -> str:
 
 
 _STATE = Path(".snakemake")
-_LOGS = Path("logs")
 
 
 class RunError(Er3aError):
@@ -219,7 +215,7 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
         if asked.dryrun:
             return _dry_run(study_file, results, reports, words, asked)
         until_done.callback(_taken_lock().release)
-        refuse_links_outside(results, reports, _LOGS)
+        refuse_links_outside(results, reports, Path("logs"))
         try:
             done = _run(study_file, results, reports, words, asked)
         except Er3aError as error:

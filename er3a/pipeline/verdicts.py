@@ -134,19 +134,20 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str, said: dic
     """The verdict of a stage; ``said``, by gap the first stage that names it, gets those that this one adds."""
     folder, stage, expected = results / robot / name, STAGES[name], study.entry(robot).expect.get(name)
     if not is_computed(folder):
-        unknown = sentence("stage.not_examined")
-        return StageVerdict(robot, name, NOT_EXAMINED, "stage.not_examined", unknown, expected=expected)
+        unknown = "stage.not_examined"
+        return StageVerdict(robot, name, NOT_EXAMINED, unknown, sentence(unknown), expected=expected)
     import_module(stage.messages)
     summary = read_scope(folder, stage)
     verdict = summary.verdict
     shown = len(getattr(verdict.finding, "demonstrations", ()))
-    fresh = [gap for each in verdict.missed for gap in each.gaps or (None,) if gap not in said]
-    again = verdict.lowered and not fresh and said[verdict.missed[0].gaps[0]].names[0]
+    gaps = [gap for each in verdict.missed for gap in each.gaps]
+    alone = {each.check for each in verdict.missed if not each.gaps} - {"scene_collision"}  # which lacks the same links
+    again = verdict.lowered and gaps and not alone and said.keys() >= {*gaps} and said[gaps[0]].names[0]
     missed = tuple(
         replace(each, gaps=tuple(dict.fromkeys(said.get(gap, gap) for gap in each.gaps))) for each in verdict.missed
     )
     if verdict.status == "caution" != expected:
-        said |= {gap: Open("as_above", (name,)) for gap in fresh if gap}
+        said |= {gap: Open("as_above", (name,)) for gap in gaps} | said
     text = say_all(replace(verdict, missed=missed).findings)
     answer = f"{text.partition('. ')[0].removesuffix('.')}."
     below = folder.parent / "validation"

@@ -94,7 +94,7 @@ def _found(arm: Arm) -> FoundTasks:
         if clear and (paths := search.paths(spots)):
             return FoundTasks(scene, spots, paths, clear, "")
     if clear:
-        shortcoming = "The path is a move of the joints between two targets: none that was tried is safe."
+        shortcoming = "The path is a joint move between targets: none tried is safe and away from singular poses."
     else:
         spots = search.any_spots()
         shortcoming = (
