@@ -162,7 +162,7 @@ def test_a_program_reads_verdicts_and_continuous_integration_an_exit_code(call, 
     found = json.loads(verdicts("--json").stdout)
     assert {each["robot"] for each in found} == set(small_study.robots)
     told = {"robot", "stage", "status", "code", "text", "expected", "demonstrations", "outdated"}
-    told |= {"checked", "not_checked", "assumed"}
+    told |= {"checked", "not_checked", "assumed", "said_by", "answer", "foundation"}
     assert set(found[0]) == told
     statuses = {each["status"] for each in found}
     assert verdicts("--fail-on", "fail").returncode == int("fail" in statuses)

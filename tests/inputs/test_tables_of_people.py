@@ -842,7 +842,8 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "float a_[2] = {0, 270};\nfloat alpha_[2] = {-90, 0};\nfloat d_[2] = {290, 0};\nfloat th0_[2] = {0, -90};\n",
         "| i | α (°) | a (mm) | d (mm) | θ | θ 零位偏移 (°) |\n|--|--|--|--|--|--|\n"
         "| 1 | -90 | 0 | 290 | θ1 | 0 (朝前) |\n| 2 | 0 | 270 | 0 | θ2 | -90 (竖直) |\n",
-        "alpha(1)=-pi/2; a(1)=0; d(1)=290; offset(1)=0;\nalpha(2)=0; a(2)=270; d(2)=0; offset(2)=-pi/2;\nq1=[-9, 9]/2;\n",
+        "alpha(1)=-pi/2; a(1)=0; d(1)=290; offset(1)=0;\nalpha(2)=0; a(2)=270; d(2)=0; offset(2)=-pi/2;\n"
+        "q1=[-9, 9]/2;\n",
         "q1, q2, q3 = symbols('q1:4')\nDH = {'alpha1': -pi/2, 'a1': 0, 'd1': 290,\n"
         "      'alpha2': 0, 'a2': 270, 'd2': 0, q2: -pi/2 + q2}\n",
         "numLinks 2\nlink_0 (offset 0.0) (D 290) (A 0.0) (alpha -90.0) (mass 1) (cog 0 0 0)\n"
@@ -851,7 +852,8 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "rows = np.array([\n  # alpha i - 1, a i - 1, d i, theta i\n  # [0.0, 0.0, 0.0, q1],\n"
         "  [-pi / 2, 0.0, 290, q1],\n  [0.0, 270, 0.0, q2 - pi/2]])\n",
         "% alpha, a, d\nM = [-pi/2 0 290;\n 0 270 0];\ntheta_offset = [0 -pi/2];\nq = [1 2];\n",
-        "| i | alpha | a | d | offset |\n|--|--|--|--|--|\n| 1 | -pi/2 | 0 | 290 | 0 |\n| 2 | 0 | a2 | 0 | T2\\_offset |\n\n"
+        "| i | alpha | a | d | offset |\n|--|--|--|--|--|\n| 1 | -pi/2 | 0 | 290 | 0 |\n| 2 | 0 | a2 | 0 | "
+        "T2\\_offset |\n\n"
         "a2 = sqrt(162^2 + 216^2) = 270;\n\nT2\\_offset = -atan(1e9) = -1.5707963 (-90°);\n",
         "alpha(1:2) = [-pi/2, 0];\na(1:2) = [0, 270];\nd(1:2) = [290, 0];\noffset(1:2) = [0, -pi/2];\n",
         "const d2 = parseFloat(input.value);\nrows = [{theta: q1, d: 290, a: 0, alpha: -PI / 2},\n"

@@ -162,8 +162,7 @@ def verdicts(
     from er3a.pipeline.verdicts import read_verdicts
     from er3a.pipeline.viewing.conditions import condition_of
 
-    loaded = load_study(study)
-    found = read_verdicts(loaded, results)
+    found = read_verdicts(load_study(study), results)
     if as_json:
         options.print_json([asdict(verdict) for verdict in found])
     else:
@@ -173,8 +172,9 @@ def verdicts(
             for each in found
         )
         options.print_table(("robot", "stage", "verdict", "finding"), rows)
-        for robot in loaded.names:
-            print(f"{robot}: {condition_of(results / robot / 'validation')}")
+        for robot in dict.fromkeys(each.robot for each in found if each.stage == "validation" and each.checked):
+            if first := condition_of(results / robot / "validation"):
+                print(f"{robot}: {first}")
         if changed := [*dict.fromkeys(name for each in found for name in each.outdated)]:
             options.print_note(f"changed since ({', '.join(changed)}): run the study again")
     if fail_on:
