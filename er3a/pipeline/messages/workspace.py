@@ -36,7 +36,7 @@ TEXTS = texts(
         ),
         "workspace.void_at_shoulder": (
             "An enclosed void of at least {litres:at_least L} L surrounds the shoulder: normal. Its centre is "
-            "({x_mm:.0f}, {y_mm:.0f}, {z_mm:.0f}) mm; no other was found."
+            "({x_mm:.0f}, {y_mm:.0f}, {z_mm:.0f}) mm; no other enclosed one was found."
         ),
         "void_disappears": "{limits:limit, }; it disappears at {extended:extended or }",
         "void_of_several_limits": "several limits together[; {most}]",
