@@ -36,7 +36,7 @@ _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
     (r"[{}$]", ""),
-    (r"\((?:t|fixed|var(?:iable|\.)?|[一-鿿]+)\)", ""),
+    (r"\((?:t|float|double|fixed|var(?:iable|\.)?|[一-鿿]+)\)", ""),
     (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
@@ -168,7 +168,7 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     InputError
         naming line and cell: for two tables, for what can be read in two ways, and for what can't be read
     """
-    text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)[ \t]+(.+)$", r"\1 = \2;", text)
+    text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)(?:\(\w+\))?[ \t]+(.+)$", r"\1 = \2;", text)
     text = re.sub(r"&#?\w+;", lambda found: html.unescape(found[0]), text)
     if not re.search(r"(?m)^[ \t]*(?![#%]|//)\S", text):  # all of it is a comment
         text = re.sub(r"(?m)^[ \t]*(?:[#%]+|//+)", "", text)

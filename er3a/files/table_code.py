@@ -171,36 +171,40 @@ _CONSTANT = {"a", "alpha", "d", "offset"}
 
 def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     """Refuse a matrix, or the list of a column, that its program changes."""
-    found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*$", group.before)
+    found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*[\[{(\s]*$", group.before)
     name = found[1] if found else ""
-    in_table = (
-        _matrix(code, group) if is_matrix else _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
-    )
-    if not in_table or not group.inside.strip():
+    table = _matrix(code, group) if is_matrix else []
+    of_column = not is_matrix and _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
+    if not (table or of_column) or not group.inside.strip():
         return
     used = {*re.findall(rf"\b{name}[\[(]\d+,\s*:", code.text)}
     if is_matrix and 0 < len(used) < len(_rows(code, group)):
         code.refuse(group.start, name, "has rows that the program does not use", "Leave them out")
-    changes = [found for found in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(found, name)]
+    changes = [each for each in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(each, name, table)]
     for change in [*_MOVED.finditer(group.before), *changes]:
         place = change.end() if change in changes else group.start
         code.refuse(place, change[0].strip(" ;"), f"changes '{name}'", "Write what the program makes of it")
 
 
-def _puts_in(found: re.Match[str], name: str) -> bool:
-    """Whether a statement changes a list: values of joints, which have no numbers, may be put into it, and it may be
-    converted as a whole, ``DH = np.radians(DH)``."""
-    place, given = found.groups()
+def _puts_in(found: re.Match[str], name: str, table: Grid) -> bool:
+    """Whether a statement changes a list: values of joints, which have no numbers, may be added to theta, or put there
+    if it is 0, and a list may be converted as a whole, ``DH = np.radians(DH)``."""
+    place, sign, given = found.groups()
     value = re.sub(r"[\[(][\w:, +-]*[\])]", "", given or "")  # without indices
-    if place:
-        return bool(re.search(r"-|(?<!\w)\d|[\[{]", value))
     own = re.search(rf"(?<![\w.])(?:self\.)?{name}\b", value)
-    return given is None or bool(own and not _CONVERTED.match(given))
+    if not place:
+        return given is None or bool(own and not _CONVERTED.match(given))
+    names = [each for _, header in table[:1] for each in header if each != "joint"]
+    last = re.findall(r"\w+", place)[-1]
+    column = dict(enumerate(names, "(" in place)).get(int(last), "") if last.isdigit() else last
+    cells = " ".join(cell for _, row in table for title, cell in zip(table[0][1], row) if title == column)
+    added = sign == "+" or (not sign and (own or not re.search(r"(?i)(?<!\w)[\d.]*[1-9]|pi|π", cells)))
+    return _place(column) != "theta" or not added or bool(re.search(r"-|(?<!\w)\d|[\[{]", value))
 
 
 _SET = (
     r"(?m)(?:^|;)[ \t]*(?:del[ \t]+NAME\b|(?:self\.)?NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
-    r"[ \t]*((?:[\[({][^\n=\])}]*[\])}])*)[ \t]*[-+*/]?=(?!=)([^\n;]*)))"
+    r"[ \t]*((?:\.\w+|[\[({][^\n=\])}]*[\])}])*)[ \t]*([-+*/]?)=(?!=)([^\n;]*)))"
 )
 """A statement that puts something into a list, or gives its name to something else."""
 _CONVERTED = re.compile(r"\s*(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\(", re.I)
@@ -408,8 +412,10 @@ def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
 
 
 def _constants(cells: dict[str, str]) -> list[str]:
-    """The cells of a row without theta, which can be an element ``q[0]``."""
-    return [cell for name, cell in cells.items() if quantities_of([name]) != ["theta"]]
+    """The numbers of a row without theta, which can be an element ``q[0]``."""
+    return [
+        cell for name, cell in cells.items() if name == "row" or quantities_of([name]) not in ([], ["theta"], ["type"])
+    ]
 
 
 @dataclass(frozen=True)
@@ -698,17 +704,20 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
         name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\]|\(1:\w+\))?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[\d*\]\w+)?[\"']?$",
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\]|\(1:\w+\))?\s*(?::(?: *\[\w+; *\d+\] *|[^=:\n\"'\d]*)(?==))?"
+            r"([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[\d*\]\w+)?[\"']?$",
             group.before,
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
             r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
-            re.sub(r"\w\[[^\[\]]*\]", "q", _closed_up(inside)),
+            re.sub(r"\w\[[^\[\]]*\]|\w+::", "q", _closed_up(inside)),
         )
         if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
             continue
-        after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
+        after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+|=(?!=))?", code.text[group.end + 1 :])
+        if after and after[1] == "=":  # the type of what follows
+            continue
         cells = row_cells(inside.replace(";", ",").replace("\n", " "))
         cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
         yield name[1], cells, code.line(group.start), name[2]
@@ -778,13 +787,17 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
     name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)"
-    name += r"[_({\[]*(\d{1,2})[)}\]]*(?(1)\1)"
+    name += r"([_({\[]*)(\d{1,2})[)}\]]*(?(1)\1)"
     pattern = rf"{name}\s*([:=])(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s\[{{](?:::|[^,}}\n;:=!])*)"
-    found: dict[str, dict[int, tuple[str, str, int]]] = {}  # value, mark and place of each number
+    spellings: dict[str, dict[str, dict[int, tuple[str, str, int]]]] = {}  # value, mark and place of each number
     text = re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text)
     for each in re.finditer(pattern, text, re.I):
-        _, name, number, mark, value = each.groups()
-        found.setdefault(name.lower(), {}).setdefault(int(number), (value.strip(), mark, each.start()))
+        _, name, bracket, number, mark, value = each.groups()
+        for spelling in (f"{bracket}{name.isupper()}", "~"):  # D1 = 0.3; d(1) = D1
+            entries = spellings.setdefault(spelling, {}).setdefault(name.lower(), {})
+            entries.setdefault(int(number), (value.strip(), mark, each.start()))
+    several = [one for _, one in sorted(spellings.items()) if {*quantities_of(one)} >= {"alpha", "a", "d"}]
+    found = spellings.get("~", {}) | (several[0] if several else {})
     quantities = dict(zip(quantities_of(found), found.values()))
     if not quantities.keys() >= {"alpha", "a", "d"}:
         return

@@ -665,6 +665,10 @@ LINES = "a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\n"
 LISTS = LINES + "off = [0, -pi/2]\n"
 RECORDS = "dh = [{'d': 0.29, 'a': 0, 'alpha': -pi/2, 'theta': 0}, {'d': 0, 'a': 0.27, 'alpha': 0, 'theta': -pi/2}]\n"
 MATRIX = "DH = [[0, 0.29, 0, -pi/2], [-pi/2, 0, 0.27, 0]]\n"
+ROWS_IN_A_STRUCT = (
+    "typedef struct { float a; float alpha; float d; float theta; } row_t;\ntypedef struct { row_t rows[2]; } arm_t;\n"
+)
+ROWS_IN_A_STRUCT += "arm_t arm = {{{0, -M_PI/2, 0.29, 0},\n {0.27, 0, 0, -M_PI/2}}};\n"
 IN_MATLAB = "DH = [0 0.29 0 -pi/2 0 0;\n 0 0 0.27 0 0 -pi/2];\n"
 
 
@@ -705,6 +709,7 @@ def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text, end):
     [
         "DH(:,1) = DH(:,1) + q_deg(:);",
         "DH(i,1) = q(i);",
+        "DH(2,1) += q(2);",
         "DH(:,1) = theta';",
         "H(1,4) = 1;",
         "x_d = [0 1]; x_d(1) = 0.5;",
@@ -770,6 +775,11 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         ("d={0.29,0};\na={0,0.27};\nalfa={-pi/2,0};\n\nd{1}=0.29+0.061;\n", "line 5: .* changes 'd'"),
         ("a = [0, 0.27]\nalpha = np.flip([0, -pi/2])\nd = [0.29, 0]\n", "changes 'alpha'"),
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\na.append(0.1)\n", "changes 'a'"),
+        ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0, 0]\nd[0] = L1\n", "changes 'd'"),
+        (f"# theta d a alpha\n{MATRIX}DH[0][1] = L1\n", "changes 'DH'"),
+        (f"# theta d a alpha\n{MATRIX}DH[0][0] = q[0]\nDH[1][0] = q[1]\n", "changes 'DH'"),
+        (f"# theta d a alpha\n{MATRIX}DH[1][0] -= q[1]\n", "changes 'DH'"),
+        (f"{ROWS_IN_A_STRUCT}arm.rows[0].theta = q[0];\n", "changes 'arm'"),
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\nq[1] = q_s[1] - pi/2\n", "line 4: .* changes theta"),
         ("L(1)=Link('d',0.29,'a',0,'alpha',0);\nL(2)=L(1);\nL(3)=Link('d',0,'a',1,'alpha',0);", "of a loop"),
         ("L = [RevoluteDH(d=0.29, alpha=pi/2)] * 2 + [RevoluteDH(a=0.3)]\n", "of a loop"),
@@ -858,6 +868,18 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "alpha(1:2) = [-pi/2, 0];\na(1:2) = [0, 270];\nd(1:2) = [290, 0];\noffset(1:2) = [0, -pi/2];\n",
         "const d2 = parseFloat(input.value);\nrows = [{theta: q1, d: 290, a: 0, alpha: -PI / 2},\n"
         "{theta: q2 - PI / 2, d: 0, a: 270, alpha: 0}]\n",
+        "d = [290, 0];\na = [0, 270];\nalpha = [-pi/2, 0];\noffset = [0, -pi/2];\n"
+        "L1 = Link('revolute', 'd', d(1), 'a', a(1), 'alpha', alpha(1), 'offset', offset(1));\n"
+        "L2 = Link('revolute', 'd', d(2), 'a', a(2), 'alpha', alpha(2), 'offset', offset(2));\n",
+        "D1 = 290;\nD2 = 270;\nd(1) = D1; a(1) = 0; alpha(1) = -pi/2; theta(1) = q(1);\n"
+        "d(2) = 0; a(2) = D2; alpha(2) = 0; theta(2) = q(2) - pi/2;\n",
+        "#define DH_A1 0\n#define DH_A2 270\n#define DH_ALPHA1 -PI / 2\n#define DH_ALPHA2 0\n#define DH_D1 290\n"
+        "#define DH_D2 0\n#define DH_THETA1(Q) ((Q))\n#define DH_THETA2(Q) ((Q) - PI / 2)\n",
+        "pub const DH_A: [f64; 2] = [0.0, 270.0];\npub const DH_D: [f64; 2] = [290.0, 0.0];\n"
+        "pub const DH_ALPHA: [f64; 2] = [-std::f64::consts::FRAC_PI_2, 0.0];\n"
+        "const DH_OFFSET: [f64; 2] = [0.0, -90.0];\n",
+        "float dh[2][4] = { // d, a, alpha, theta\n  {290.0, 0.0, -(float)M_PI/2, 0.0},\n"
+        "  {0.0, 270.0, 0.0, (float)-M_PI/2}};\n",
     ],
 )
 def test_names_and_places_that_programs_give_a_table_are_read(tmp_path, text):
