@@ -665,9 +665,8 @@ LINES = "a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\n"
 LISTS = LINES + "off = [0, -pi/2]\n"
 RECORDS = "dh = [{'d': 0.29, 'a': 0, 'alpha': -pi/2, 'theta': 0}, {'d': 0, 'a': 0.27, 'alpha': 0, 'theta': -pi/2}]\n"
 MATRIX = "DH = [[0, 0.29, 0, -pi/2], [-pi/2, 0, 0.27, 0]]\n"
-ROWS_IN_A_STRUCT = (
-    "typedef struct { float a; float alpha; float d; float theta; } row_t;\ntypedef struct { row_t rows[2]; } arm_t;\n"
-)
+ROWS_IN_A_STRUCT = "typedef struct {\nfloat a;\nfloat alpha;\nfloat d;\nfloat theta;\n} row_t;\n"
+ROWS_IN_A_STRUCT += "typedef struct { row_t rows[2]; } arm_t;\n"
 ROWS_IN_A_STRUCT += "arm_t arm = {{{0, -M_PI/2, 0.29, 0},\n {0.27, 0, 0, -M_PI/2}}};\n"
 IN_MATLAB = "DH = [0 0.29 0 -pi/2 0 0;\n 0 0 0.27 0 0 -pi/2];\n"
 
