@@ -796,11 +796,11 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         for spelling in (f"{bracket}{name.isupper()}", "~"):  # D1 = 0.3; d(1) = D1
             entries = spellings.setdefault(spelling, {}).setdefault(name.lower(), {})
             entries.setdefault(int(number), (value.strip(), mark, each.start()))
-    several = [one for _, one in sorted(spellings.items()) if {*quantities_of(one)} >= {"alpha", "a", "d"}]
-    found = spellings.get("~", {}) | (several[0] if several else {})
-    quantities = dict(zip(quantities_of(found), found.values()))
-    if not quantities.keys() >= {"alpha", "a", "d"}:
+    whole = [one for _, one in sorted(spellings.items()) if {*quantities_of(one)} >= {"alpha", "a", "d"}]
+    if not whole:
         return
+    found = whole[-1] | whole[0]
+    quantities = dict(zip(quantities_of(found), found.values()))
     if len(found) == 3 and "DH_A" not in code.text and (used := _USED.search(code.text)):
         code.refuse(used.start(), used[0], "is no column of a table", "Write a list of theta or offset")
     for name, entries in found.items():
