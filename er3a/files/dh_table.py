@@ -256,7 +256,7 @@ def _placement(T: Reals, source: str) -> dict[str, Any]:
 def _assumed(given: set[str], kinds: set[str], convention: Convention) -> Iterator[str]:
     """What is assumed because no column of the table says it."""
     if convention == "standard" and "convention" not in given:
-        yield "the table was read as standard D-H; as Craig's it is another arm: --convention modified"
+        yield "the table was read as standard D-H; --convention modified if it is Craig's"
     if not given & {"offset_deg", "direction"}:
         yield "no column offset_deg or direction: joint angles are taken to be the table's own"
     if "deg" in kinds and "lower_deg" not in given:
