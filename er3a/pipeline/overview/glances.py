@@ -42,7 +42,7 @@ def glance(results: object) -> Glance:
 def _(results: ValidationResults) -> Glance:
     summary = results.summary
     counts, evidence = summary.counts.independent, summary.evidence
-    value = f"{counts.passed}/{counts.total}" if counts.total else "–"
+    value = tr("{passed}/{total} checks", passed=counts.passed, total=counts.total) if counts.total else "–"
     if summary.verdict.status == "fail":
         bad = evidence.contradicted if evidence else 0
         return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
@@ -51,8 +51,7 @@ def _(results: ValidationResults) -> Glance:
         return value, tr("sources differ by {off}", off=with_unit(fixed(max(stated) - min(stated), 1), conflict.unit))
     if not evidence or not evidence.unconfirmed:
         return value, ""
-    known = known_alone(evidence)
-    return value, tr("{count}/{all} settled", count=known - len(evidence.unconfirmed), all=known)
+    return value, tr("{count} of {all} open", count=len(evidence.unconfirmed), all=known_alone(evidence))
 
 
 @glance.register

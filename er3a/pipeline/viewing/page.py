@@ -191,7 +191,7 @@ class Head:
     ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
     to know first.
     ``checked``: each check, how much it covers, and why not all. ``assumed``: without a document.
-    ``condition``: what of the table has to be confirmed; empty where that is not known.
+    ``condition``: what of the table has to be confirmed, ``unconfirmed`` entries; empty where that is not known.
     """
 
     robot: str
@@ -205,6 +205,7 @@ class Head:
     checked: tuple[tuple[str, str, str], ...] = ()
     assumed: tuple[str, ...] = ()
     condition: str = ""
+    unconfirmed: int = 0
 
     @property
     def no_verdict(self) -> bool:
@@ -218,8 +219,8 @@ class Head:
         rests on a table of which documents settle nothing is a caution."""
         if self.no_verdict:
             return "no_verdict"
-        if self.status != "pass":
-            return self.status
+        if self.status != "pass":  # a table about which documents disagree is worse than one of which part is open
+            return "conflict" if self.status == "caution" and getattr(self.summary, "conflicts", ()) else self.status
         first = self.caveats.get("validation")
         if first is not None and first.status == "unsettled":
             return "caution"
@@ -296,7 +297,7 @@ def head_of(stored: Stored[Any]) -> Head:
         summary,
         checked,
         tuple(map(assumed_text, summary.assumed)),
-        condition_of(stored.validated),
+        *condition_of(stored.validated),
     )
 
 
