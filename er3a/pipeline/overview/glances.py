@@ -42,7 +42,7 @@ def glance(results: object) -> Glance:
 def _(results: ValidationResults) -> Glance:
     summary = results.summary
     counts, evidence = summary.counts.independent, summary.evidence
-    value = tr("{passed}/{total} checks", passed=counts.passed, total=counts.total) if counts.total else "–"
+    value = f"{counts.passed}/{counts.total}" if counts.total else "–"
     if summary.verdict.status == "fail":
         bad = evidence.contradicted if evidence else 0
         return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)

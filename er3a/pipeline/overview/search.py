@@ -19,9 +19,8 @@ _NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w
 class TextOfPage(HTMLParser):
     """Headings, rows and captions of a page's main part, folded or not, in the page's order, by heading."""
 
-    KEPT = frozenset(("caption", "figcaption", "h1", "h2", "h3", "li", "summary", "tr"))
-    BLOCKS = KEPT | {"details", "div", "dl", "dt", "figure", "main", "ol", "p", "pre", "section", "table", "ul"}
-    NOT_READ = frozenset(("button", "nav", "select", "svg", "thead"))
+    KEPT = ("caption", "figcaption", "h1", "h2", "h3", "li", "summary", "tr")
+    NOT_READ = ("svg", "thead")
 
     def __init__(self) -> None:
         super().__init__()
@@ -42,21 +41,21 @@ class TextOfPage(HTMLParser):
             self._depth[tag] -= 1
         if tag in self._heads:
             self._heads |= {"h3": ""} | {tag: " ".join("".join(self._parts).split())}
-        self._between(tag, tag in self.KEPT)
+        self._between(tag, ended=True)
 
     def handle_data(self, data: str) -> None:
         """Take text of the main part, but for what is in ``NOT_READ``."""
         if self._depth["main"] and not any(self._depth[tag] for tag in self.NOT_READ):
             self._parts.append(data)
 
-    def _between(self, tag: str, kept: bool = False) -> None:
-        """Where a block begins or ends, what came before is one text, to be kept or not; cells and what is in them stay
-        in their row's."""
-        if tag not in self.BLOCKS or self._depth["tr"]:
+    def _between(self, tag: str, ended: bool = False) -> None:
+        """Where what is kept ends, what came since it began is one text; cells and what is in them stay in their
+        row's."""
+        if tag not in self.KEPT or self._depth["tr"]:
             self._parts.append("" if tag in INLINE else " ")
             return
         text = " ".join("".join(self._parts).split())
-        if kept and len(text) > 1:
+        if ended and len(text) > 1:
             self.texts.setdefault(joined([*filter(None, self._heads.values())], " "), {})[text] = None
         self._parts = []
 

@@ -382,16 +382,13 @@ function keepWarnings(main) {
 function addFinder() {
   const main = document.querySelector("main");
   if (document.body.classList.contains("teach")) return;
-  const box = document.createElement("p");
+  const box = Object.assign(document.createElement("p"), { className: "find", role: "search" });
   const field = document.createElement("input");
-  const status = document.createElement("span");
+  const status = Object.assign(document.createElement("span"), { role: "status" });
   const elsewhere = document.createElement("ul");
-  box.className = "find";
-  box.role = "search";
   field.type = "search";
   field.placeholder = field.ariaLabel = document.getElementById("places") ? WORDS.findAnywhere : WORDS.find;
   field.value = new URLSearchParams(location.search).get("find") ?? "";
-  status.role = "status";
   elsewhere.className = elsewhere.id = "elsewhere";
   box.append(field, " ", status);
   const header = document.querySelector("header");
@@ -407,11 +404,7 @@ function addFinder() {
     const here = words.length ? keepFound(main, words, "") : 0;
     const away = others.reduce((sum, { texts }) => sum + texts.length, 0);
     const count = here + away;
-    status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : document.getElementById("places") ? WORDS.noneAnywhere : WORDS.none;
-    if (here && away) {
-      const below = Object.assign(document.createElement("a"), { href: "#elsewhere", textContent: WORDS.elsewhere.replace("{count}", away) });
-      status.append(" · ", below);
-    }
+    status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : WORDS.none;
     if (count) keepWarnings(main);
     if (!words.length || !count) { // all of the page
       for (const part of [main, ...main.querySelectorAll(".unfound")]) part.classList.remove("unfound", "finding");

@@ -59,8 +59,6 @@ VERDICT_WORDS = {
     "caution": N_("caution"),
     "fail": N_("fail"),
     "conflict": N_("conflict"),
-    "no_reference": N_("no reference"),
-    "not_computed": N_("not computed"),
 }
 
 PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("Teach panel")}
@@ -83,9 +81,7 @@ SCRIPT_WORDS = {
     "find": N_("Find"),
     "findAnywhere": N_("Find on all pages"),
     "found": N_("{count} places"),
-    "elsewhere": N_("{count} of them on other pages"),
     "none": N_("Nothing has all these words: try fewer, or others"),
-    "noneAnywhere": N_("No page has all these words in one place: try fewer, or others"),
     "colon": N_(": "),
     "bounds": N_("at least|at most|up to|about"),  # words before a number by which cells are sorted all the same
 }

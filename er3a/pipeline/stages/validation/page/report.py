@@ -258,15 +258,12 @@ def _answer(
     headline, rest = _headline(summary, bad, unsure)
     keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.total else []
     below = ""
-    if evidence:
-        alone = known_alone(evidence)
-        keys.append((f"{bad or unsure}/{alone}", tr("entries contradicted") if bad else tr("entries open")))
-        if unsure and not bad:
-            settled = sum(each.status == "settled" for each in evidence.entries)
-            signs = alone - unsure - settled
-            below = tr(
-                "{settled} settled, {signs} but for signs, {left} open.", settled=settled, signs=signs, left=unsure
-            )
+    if evidence and bad:
+        keys.append((f"{bad}/{known_alone(evidence)}", tr("entries contradicted")))
+    elif evidence and unsure:
+        settled = sum(each.status == "settled" for each in evidence.entries)
+        signs = known_alone(evidence) - unsure - settled
+        below = tr("{settled} settled, {signs} but for signs, {left} open.", settled=settled, signs=signs, left=unsure)
     values = [stated.expected for each in disputed[:1] for stated in each.statements]
     if disputed:
         off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)
