@@ -353,8 +353,8 @@ def test_way_points_become_a_path_file_and_a_program_that_er3a_reads(panel, tmp_
         ((10, 20, 30, 40, 3, 0), "near", "Near the wrist singularity: axes 4 and 6 are 3.0° from parallel."),
         ((10, 20, 30, 40, 0, 0), "at", "At the wrist singularity"),
         ((0, 0, 76.824, 0, 50, 0), "near", "Near the elbow singularity"),
-        ((0, 0, 0, 0, 50, 0), "clear", "No singularity is near."),
-        ((0, 60.5, -30, 0, 50, 0), "clear", "No singularity is near."),
+        ((0, 0, 0, 0, 50, 0), "clear", "Clear: no contact, limit or singularity."),
+        ((0, 60.5, -30, 0, 50, 0), "clear", "Clear: no contact, limit or singularity."),
     ],
 )
 def test_the_warning_names_what_is_near(used, degrees, state, told):

@@ -420,7 +420,7 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
 def test_the_teach_panel_says_first_what_validation_came_to(study, tmp_path, monkeypatch, status, told):
     folder = tmp_path / "results/er3_600/validation"
     monkeypatch.setattr(panel, "program_head", lambda validated: [f"by {validated}"])  # what is made up has no evidence
-    monkeypatch.setattr(panel, "condition_of", lambda validated: "")
+    monkeypatch.setattr(panel, "condition_of", lambda validated: ("", 0))
     if status:
         found = AbsentResults(Summary(Verdict(status, fact("stage.not_computed", reason="made up")), ()))
         write_results(folder, study, "er3_600", STAGES["validation"], found)

@@ -173,7 +173,7 @@ def verdicts(
         )
         options.print_table(("robot", "stage", "verdict", "finding"), rows)
         for robot in dict.fromkeys(each.robot for each in found if each.stage == "validation" and each.checked):
-            if first := condition_of(results / robot / "validation"):
+            if first := condition_of(results / robot / "validation")[0]:
                 print(f"{robot}: {first}")
         if changed := [*dict.fromkeys(name for each in found for name in each.outdated)]:
             options.print_note(f"changed since ({', '.join(changed)}): run the study again")

@@ -51,8 +51,7 @@ def _(results: ValidationResults) -> Glance:
         return value, tr("sources differ by {off}", off=with_unit(fixed(max(stated) - min(stated), 1), conflict.unit))
     if not evidence or not evidence.unconfirmed:
         return value, ""
-    known = known_alone(evidence)
-    return value, tr("{count}/{all} settled", count=known - len(evidence.unconfirmed), all=known)
+    return value, tr("{count} of {all} open", count=len(evidence.unconfirmed), all=known_alone(evidence))
 
 
 @glance.register

@@ -95,7 +95,6 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         stages=_asked(study),
         questions={name: stage.question for name, stage in STAGES.items()},
         arms=_picture(study, drawn, stored),
-        drawn=drawn,
         steps=_steps(chosen, stored[chosen.name]),
         tiles=_tiles(study, ranked, drawn[-1].name, stored),
         article=study.article is not None,

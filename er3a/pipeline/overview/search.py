@@ -1,4 +1,4 @@
-"""What the index searches: all text of all pages, by heading."""
+"""What the index searches: headings, rows and captions of all pages."""
 
 from __future__ import annotations
 
@@ -12,17 +12,15 @@ from er3a.pipeline.messages.say import bracketed, joined
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import PAGES
 
-INLINE = ("a", "b", "code", "em", "i", "mark", "span", "strong", "sub", "sup", "wbr")  # no blank before or behind
+INLINE = ("sub", "sup", "wbr")  # no blank before or behind
 _NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w-]+="[^"]*"', re.DOTALL)
 
 
 class TextOfPage(HTMLParser):
-    """All text of a page's main part, folded or not: by heading, in the page's order, that of each block and row."""
+    """Headings, rows and captions of a page's main part, folded or not, in the page's order, by heading."""
 
-    ROWS = ("caption", "table", "tr")
-    TEXTS = ("dl", "dt", "h2", "h3", "li", "ol", "p", "pre", "ul")
-    BLOCKS = frozenset((*ROWS, *TEXTS, "details", "div", "figcaption", "figure", "img", "main", "section", "summary"))
-    NOT_READ = frozenset(("button", "nav", "select", "svg", "thead"))
+    KEPT = ("caption", "figcaption", "h1", "h2", "h3", "li", "summary", "tr")
+    NOT_READ = ("svg", "thead")
 
     def __init__(self) -> None:
         super().__init__()
@@ -32,12 +30,10 @@ class TextOfPage(HTMLParser):
         self._parts = list[str]()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Begin a block or row; what an image shows counts as text."""
-        named = dict(attrs)
+        """Begin a block or row."""
         self._between(tag)
         if tag in self._depth:
             self._depth[tag] += 1
-        self.handle_data(named.get("alt") or "")
 
     def handle_endtag(self, tag: str) -> None:
         """End a block or row; a heading's text is that of what follows."""
@@ -45,20 +41,21 @@ class TextOfPage(HTMLParser):
             self._depth[tag] -= 1
         if tag in self._heads:
             self._heads |= {"h3": ""} | {tag: " ".join("".join(self._parts).split())}
-        self._between(tag)
+        self._between(tag, ended=True)
 
     def handle_data(self, data: str) -> None:
         """Take text of the main part, but for what is in ``NOT_READ``."""
         if self._depth["main"] and not any(self._depth[tag] for tag in self.NOT_READ):
             self._parts.append(data)
 
-    def _between(self, tag: str) -> None:
-        """Where a block begins or ends, what came before is one text; cells and what is in them stay in their row's."""
-        if tag not in self.BLOCKS or self._depth["tr"]:
+    def _between(self, tag: str, ended: bool = False) -> None:
+        """Where what is kept ends, what came since it began is one text; cells and what is in them stay in their
+        row's."""
+        if tag not in self.KEPT or self._depth["tr"]:
             self._parts.append("" if tag in INLINE else " ")
             return
         text = " ".join("".join(self._parts).split())
-        if len(text) > 1:
+        if ended and len(text) > 1:
             self.texts.setdefault(joined([*filter(None, self._heads.values())], " "), {})[text] = None
         self._parts = []
 
@@ -66,7 +63,7 @@ class TextOfPage(HTMLParser):
 def places(
     study: Study, folder: Path, contradicted: Set[str]
 ) -> Iterator[tuple[str, str, list[tuple[str, list[str]]]]]:
-    """Of each page that is there its address, its title, and by heading all of its text; a title says which robots'
+    """Of each page that is there its address, its title, and by heading what is searched; a title says which robots'
     tables evidence contradicts."""
     titles = {
         name: bracketed(own_title(study.robot(name).title), tr("never use this table") if name in contradicted else "")

@@ -138,7 +138,8 @@ WORDS: dict[str, Any] = {
         "shoulder": N_("wrist centre from the plane of axes 1 and 2"),
     },
     "states": {"clear": N_("clear"), "near": N_("near"), "at": N_("singular")},
-    "clear": N_("No singularity is near."),
+    "clear": N_("Clear: no contact, limit or singularity."),
+    "touch": {"near": N_("Near contact."), "at": N_("Collision.")},
     "near": {
         "wrist": N_("Near the wrist singularity: axes 4 and 6 are {distance} from parallel."),
         "elbow": N_("Near the elbow singularity: the arm is {distance} from straight or folded."),
@@ -222,7 +223,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         first_caveat=caveat(read_foundation(validated) if known else "not_computed"),
         instead=alternative_table(study, name, validated),
         head=program_head(validated if known else None),
-        condition=condition_of(validated) if known else "",
+        condition=condition_of(validated) if known else ("", 0),
         command=run_command(study, f"{name}/teach.html"),
         provenance=Provenance(
             input_records(study.inputs(name, "teach")), code_digest(), config=study.settings(name, "trajectory")
@@ -251,24 +252,26 @@ def write_panel(
     first_caveat: Caveat | None = None,
     instead: str | None = None,
     head: Sequence[str] | None = None,
-    condition: str = "",
+    condition: tuple[str, int] = ("", 0),
 ) -> None:
     """Write the teach panel of a robot.
 
     Parameters
     ----------
     near : where the panel warns of a singularity
-    home : (n,), rad or m, that the panel opens at; None for that of the robot's file, or else joints in the middle of
-        their limits, but for the one that turns the arm farthest from singular
+    home : (n,), rad or m, that the panel opens at; else that of the robot's file, or else joints in the middle of
+        their limits, but for one, the farthest from singular first: the first of these that is clear and regular
     robots, robot_pages : of the study: arms with a panel (name, title, address), and this arm's other pages
-    first_caveat : what to know of its table, if anything; condition : what of it has to be confirmed
+    first_caveat : what to know of its table, if anything; condition : what of it has to be confirmed, and
+        how many entries these are
     instead : of ``robots`` that of the table to use where evidence contradicts this one
     head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
     tried = (robot.lower + robot.upper) / 2 + np.diag(robot.upper - robot.lower) / 4
-    regular = tried[conditioning(robot, tried).smallest_singular_value.argmax()]
-    opened = np.clip(next(q for q in (home, robot.home, regular) if q is not None), robot.lower, robot.upper)
+    regular = tried[conditioning(robot, tried).smallest_singular_value.argsort()[::-1]]
+    rows = np.clip([*(q for q in (home, robot.home) if q is not None), *regular], robot.lower, robot.upper)
+    opened = rows[(Bodies(robot, scene).free(rows, NEAR_TOUCH) & ~near.contains(robot, rows)).argmax()]
     panel = own | {
         "programs": own["programs"] and not (first_caveat and first_caveat.status == "fail"),
         "scene": drawn_scene(scene.solids if scene else (), robot),

@@ -51,6 +51,8 @@ export function showMeasures(data, T, tight) {
     row.querySelector(".fill").style.width = `${Math.min(100, (100 * distance) / full[kind])}%`;
     row.querySelector(".mark").style.left = `${(100 * near[kind]) / full[kind]}%`;
   }
+  const { state: touch } = byId("clearance").dataset; // written before
+  texts[touch]?.push(words.touch[touch]);
   texts.near.push(...tight);
   const warning = byId("warning");
   warning.dataset.state = ["at", "near"].find((word) => texts[word].length) ?? "clear";

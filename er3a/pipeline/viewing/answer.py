@@ -121,9 +121,9 @@ def may_run(sound: int, due: int, caught: int, what: str) -> tuple[str, str]:
 
 def all_caught(count: int) -> str:
     """That all that is meant to fail does; empty where nothing is meant to."""
-    if count < 3:
-        return ("", tr("The faulty one is caught."), tr("Both faulty ones are caught."))[count]
-    return tr("All {count} faulty ones are caught.", count=count)
+    if count < 2:
+        return ("", tr("1 test fault, caught."))[count]
+    return tr("{count} test faults, all caught.", count=count)
 
 
 def lengths(durations_s: Iterable[float]) -> list[float]:

@@ -16,7 +16,7 @@ from er3a.pipeline.scope import Coverage, Open
 from er3a.pipeline.stages.registry import STAGES
 
 
-def condition_of(validated: Path | None) -> str:
+def condition_of(validated: Path | None) -> tuple[str, int]:
     """What of a table has to be confirmed before anything is run on the arm.
 
     Parameters
@@ -26,6 +26,7 @@ def condition_of(validated: Path | None) -> str:
     Returns
     -------
     text : empty where documents settle all of the table that has to be settled
+    count : of the entries that it asks to confirm; 0 where no document speaks of the table
 
     Raises
     ------
@@ -34,7 +35,8 @@ def condition_of(validated: Path | None) -> str:
     """
     summary = read_stage(validated, STAGES["validation"]).results.summary if validated else None
     evidence, finding = getattr(summary, "evidence", None), summary and summary.verdict.finding
-    return condition(evidence.parts if evidence else (), getattr(finding, "unbounded", ()))
+    text = condition(evidence.parts if evidence else (), getattr(finding, "unbounded", ()))
+    return text, len(evidence.unconfirmed) if evidence else 0
 
 
 def program_head(
@@ -56,4 +58,4 @@ def program_head(
     with language.using("en"):
         missed = [f"not checked: {missed_text(each)}" for each in checked if not each.complete]
         given = [f"assumed: {assumed_text(each)}" for each in assumed]
-        return [line for line in (condition_of(validated), *missed, *given, never_text(stage)) if line]
+        return [line for line in (condition_of(validated)[0], *missed, *given, never_text(stage)) if line]

@@ -264,8 +264,7 @@ function answerPointer(image, linesAt) {
     const lines = linesAt(event);
     box.hidden = lines.length === 0;
     box.replaceChildren(...lines.map(({ text, colour }) => {
-      const line = document.createElement("div");
-      line.textContent = text;
+      const line = Object.assign(document.createElement("div"), { textContent: text });
       if (colour) line.style.setProperty("--swatch", colour);
       line.classList.toggle("swatch", Boolean(colour));
       return line;
@@ -337,6 +336,9 @@ function allText(element) {
   return `${element.alt ?? ""} ${[...element.childNodes].map(allText).join("")} `;
 }
 
+// Whether a text holds a word, from the word's beginning on.
+const holdsWord = (text, word) => new RegExp(`(?<![a-z\\d])${word.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")}`).test(text);
+
 // As it is compared: in small letters, with plain minus signs and numbers.
 const sought = (text) => text.toLowerCase().replaceAll("−", "-").replaceAll("\u202f", "");
 
@@ -347,7 +349,7 @@ function keepFound(element, words, above) {
   if (element.matches(BESIDE)) return 0;
   if (element.matches(WHOLE) || !element.querySelector(CONTAINERS)) {
     const text = above + sought(allText(element));
-    count = Number(words.every((word) => text.includes(word)));
+    count = Number(words.every((word) => holdsWord(text, word)));
   } else {
     for (const child of element.children) {
       const rank = HEADINGS.indexOf(child.tagName);
@@ -380,16 +382,13 @@ function keepWarnings(main) {
 function addFinder() {
   const main = document.querySelector("main");
   if (document.body.classList.contains("teach")) return;
-  const box = document.createElement("p");
+  const box = Object.assign(document.createElement("p"), { className: "find", role: "search" });
   const field = document.createElement("input");
-  const status = document.createElement("span");
+  const status = Object.assign(document.createElement("span"), { role: "status" });
   const elsewhere = document.createElement("ul");
-  box.className = "find";
-  box.role = "search";
   field.type = "search";
   field.placeholder = field.ariaLabel = document.getElementById("places") ? WORDS.findAnywhere : WORDS.find;
   field.value = new URLSearchParams(location.search).get("find") ?? "";
-  status.role = "status";
   elsewhere.className = elsewhere.id = "elsewhere";
   box.append(field, " ", status);
   const header = document.querySelector("header");
@@ -405,11 +404,7 @@ function addFinder() {
     const here = words.length ? keepFound(main, words, "") : 0;
     const away = others.reduce((sum, { texts }) => sum + texts.length, 0);
     const count = here + away;
-    status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : document.getElementById("places") ? WORDS.noneAnywhere : WORDS.none;
-    if (here && away) {
-      const below = Object.assign(document.createElement("a"), { href: "#elsewhere", textContent: WORDS.elsewhere.replace("{count}", away) });
-      status.append(" · ", below);
-    }
+    status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : WORDS.none;
     if (count) keepWarnings(main);
     if (!words.length || !count) { // all of the page
       for (const part of [main, ...main.querySelectorAll(".unfound")]) part.classList.remove("unfound", "finding");
@@ -460,10 +455,10 @@ async function loadPlaces() {
 // What other pages have that holds all words, at least one of them itself and the others in a heading above it, by page.
 // Words that a page's title has lead to the page.
 function placesElsewhere(words) {
-  const holds = ({ letters, above }) => words.every((word) => letters.includes(word) || above.includes(word)) && words.some((word) => letters.includes(word));
+  const holds = ({ letters, above }) => words.every((word) => holdsWord(`${above} ${letters}`, word)) && words.some((word) => holdsWord(letters, word));
   const found = places.map(({ address, title, whole, texts }) => {
     const held = texts.filter(holds).map(({ text }) => text);
-    return { address, title, texts: held.length || !words.every((word) => whole.includes(word)) ? held : [title] };
+    return { address, title, texts: held.length || !words.every((word) => holdsWord(whole, word)) ? held : [title] };
   });
   return found.filter(({ texts }) => texts.length);
 }
@@ -481,11 +476,8 @@ const squeezed = (text) => text.replace(/\s+/g, "");
 function linkTo({ address, title, texts }, words) {
   const item = document.createElement("li");
   const link = (text, place) => {
-    const made = document.createElement("a");
     const asked = new URLSearchParams({ find: words.join(" "), ...(place && { at: squeezed(place).slice(0, BEGINNING) }) });
-    made.href = `${address}?${asked}`;
-    made.textContent = text;
-    return made;
+    return Object.assign(document.createElement("a"), { href: `${address}?${asked}`, textContent: text });
   };
   const shown = texts.slice(0, SHOWN_PLACES).flatMap((text) => [" · ", link(excerpt(text, words), text)]).slice(1);
   item.append(link(title), WORDS.colon, ...shown, texts.length > SHOWN_PLACES ? ` … (${texts.length})` : "");
@@ -552,8 +544,7 @@ function showOneOf(group) {
     show(part);
     dispatchEvent(new CustomEvent("chosen", { detail: motionOf(part) }));
   };
-  const label = document.createElement("label");
-  label.className = "pickers";
+  const label = Object.assign(document.createElement("label"), { className: "pickers" });
   label.append(`${group.dataset.oneOf} `, chooser);
   group.before(label);
   chooser.addEventListener("change", () => choose(parts[chooser.selectedIndex]));
@@ -678,10 +669,8 @@ for (const figure of document.querySelectorAll("figure")) {
   if (image.dataset.axes) answer(image);
   const tools = document.createElement("p");
   tools.className = "tools";
-  const save = document.createElement("a");
-  save.href = image.src;
-  save.download = `${nameFor(figure)}.${image.src.match(/^data:image\/(\w+)/)?.[1] ?? "svg"}`;
-  save.textContent = WORDS.svg;
+  const file = `${nameFor(figure)}.${image.src.match(/^data:image\/(\w+)/)?.[1] ?? "svg"}`;
+  const save = Object.assign(document.createElement("a"), { href: image.src, download: file, textContent: WORDS.svg });
   tools.append(toolButton(WORDS.enlarge, () => enlarge(image)), save);
   image.after(tools);
 }
@@ -756,10 +745,14 @@ addEventListener("player", returnToPlace);
 returnToPlace();
 
 // What an entry of a table is of is marked in the picture: of the address, or under the pointer. What the address asks for
-// together is marked in the table.
+// together is marked in the table; the evidence of an entry stands below.
 const entryOf = (hash) => hash?.slice(1).replace(/^(cell|entry)-/, "") || null;
 const entryLinks = document.querySelectorAll(".runs a[href^='#cell-'], .grid .entries a");
+const evidence = Object.assign(document.createElement("p"), { className: "evidence", role: "status" });
+if (entryLinks.length) document.querySelector(".side > :last-child").append(evidence);
 function showEntry(entry = entryOf(location.hash)) {
+  const cells = [...(document.getElementById(`entry-${entry}`)?.cells ?? [])].filter((cell) => textOf(cell) !== "–");
+  evidence.textContent = cells.map((cell, k) => (k < 3 ? "" : `${cell.dataset.column}${WORDS.colon}`) + textOf(cell)).join(" · ");
   for (const link of document.querySelectorAll(".grid .key > a")) link.hash = document.getElementById(`entry-${entry}`)?.id ?? "marks";
   for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
   for (const link of entryLinks) link.toggleAttribute("data-shown", [entryOf(link.hash), link.dataset.asked].includes(entry));

@@ -59,8 +59,6 @@ VERDICT_WORDS = {
     "caution": N_("caution"),
     "fail": N_("fail"),
     "conflict": N_("conflict"),
-    "no_reference": N_("no reference"),
-    "not_computed": N_("not computed"),
 }
 
 PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("Teach panel")}
@@ -83,9 +81,7 @@ SCRIPT_WORDS = {
     "find": N_("Find"),
     "findAnywhere": N_("Find on all pages"),
     "found": N_("{count} places"),
-    "elsewhere": N_("{count} of them on other pages"),
     "none": N_("Nothing has all these words: try fewer, or others"),
-    "noneAnywhere": N_("No page has all these words in one place: try fewer, or others"),
     "colon": N_(": "),
     "bounds": N_("at least|at most|up to|about"),  # words before a number by which cells are sorted all the same
 }
@@ -191,7 +187,7 @@ class Head:
     ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
     to know first.
     ``checked``: each check, how much it covers, and why not all. ``assumed``: without a document.
-    ``condition``: what of the table has to be confirmed; empty where that is not known.
+    ``condition``: what of the table has to be confirmed, ``unconfirmed`` entries; empty where that is not known.
     """
 
     robot: str
@@ -205,6 +201,7 @@ class Head:
     checked: tuple[tuple[str, str, str], ...] = ()
     assumed: tuple[str, ...] = ()
     condition: str = ""
+    unconfirmed: int = 0
 
     @property
     def no_verdict(self) -> bool:
@@ -218,8 +215,8 @@ class Head:
         rests on a table of which documents settle nothing is a caution."""
         if self.no_verdict:
             return "no_verdict"
-        if self.status != "pass":
-            return self.status
+        if self.status != "pass":  # a table about which documents disagree is worse than one of which part is open
+            return "conflict" if self.status == "caution" and getattr(self.summary, "conflicts", ()) else self.status
         first = self.caveats.get("validation")
         if first is not None and first.status == "unsettled":
             return "caution"
@@ -296,7 +293,7 @@ def head_of(stored: Stored[Any]) -> Head:
         summary,
         checked,
         tuple(map(assumed_text, summary.assumed)),
-        condition_of(stored.validated),
+        *condition_of(stored.validated),
     )
 
 

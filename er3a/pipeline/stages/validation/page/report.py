@@ -33,6 +33,7 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     other_robot,
     plain_table,
     poses_to_read,
+    to_confirm,
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix
@@ -257,12 +258,12 @@ def _answer(
     headline, rest = _headline(summary, bad, unsure)
     keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.total else []
     below = ""
-    if evidence:
-        alone = known_alone(evidence)
-        count, what = (bad, tr("entries contradicted")) if bad else (alone - unsure, tr("entries settled by them"))
-        keys.append((f"{count}/{alone}", what))
-        if unsure and not bad:
-            below = tr("{count} entries may be wrong unnoticed.", count=unsure)
+    if evidence and bad:
+        keys.append((f"{bad}/{known_alone(evidence)}", tr("entries contradicted")))
+    elif evidence and unsure:
+        settled = sum(each.status == "settled" for each in evidence.entries)
+        signs = known_alone(evidence) - unsure - settled
+        below = tr("{settled} settled, {signs} but for signs, {left} open.", settled=settled, signs=signs, left=unsure)
     values = [stated.expected for each in disputed[:1] for stated in each.statements]
     if disputed:
         off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)
@@ -300,5 +301,10 @@ def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[
     if status == "no_reference":
         return tr("Nothing to check against."), tr("Find documents or measure.")
     if unsure:
-        return tr("Partly settled."), tr("Nothing contradicts this D-H table.")
+        count, known = (
+            len(to_confirm(summary.evidence)),
+            [part.settled or part.up_to_signs for part in summary.evidence.parts],
+        )
+        first = tr("Good for planning.") if any(known) else tr("Not settled.")
+        return first, tr("Points to confirm before the arm moves: {count}.", count=count)
     return tr("This D-H table is right."), tr("Documents settle every entry.")
