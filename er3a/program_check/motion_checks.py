@@ -344,7 +344,8 @@ def _stopped(path: MotionPath, ahead: Reals, target: Reals) -> Finding:
         except PoseError:
             continue
         if not len(solutions.q):
-            return fact("way_out_of_reach", at_mm=at_mm, reasons=solutions.unsolved)
+            place = tuple(target[:3, 3].tolist())
+            return fact("way_out_of_reach", at_mm=at_mm, reasons=solutions.unsolved, target_m=place)
     away = np.abs(solutions.q - last).max(axis=1)
     other = solutions.q[int(away.argmin())] - last
     joint = int(np.abs(other).argmax())

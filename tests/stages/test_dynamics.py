@@ -477,7 +477,7 @@ def test_page_and_recording_say_what_was_found(full, tmp_path):
     study, found = full
     report(study, found, tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    for heading in ("Against the limits", "Motor requirements", "At rest"):
+    for heading in ("Against the limits", "Motor torques", "At rest"):
         assert heading in page
     body = re.sub(r"<(script|style).*?</\1>|data:[^\"']*", "", page, flags=re.DOTALL)
     assert not re.search(r"\b(nan|NaN|inf|None)\b", body)

@@ -138,7 +138,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     assert "this tool is not given: not followed: TOOL_DATA[7]" in html
     program = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == "outside_limits")
     found = next(each for each in program.findings if each.finding.code == "above_limit")
-    said = f"from {found.motion_s:.2f} s into this line on"
+    said = f"{found.program_s:.2f} s"
     assert f'data-play="outside_limits" data-t="{found.program_s}">{said}' in html
     listed = faults(stored["er3a_c60"].results)
     assert {each.name for each in listed if each.meant} == {
@@ -147,7 +147,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     (fault,) = (each for each in listed if each.name == "collision_with_table")
     own = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == fault.name)
     first = next(each for each in own.findings if each.finding.code == "motion_collides")
-    assert fault.moments[0].when == f"line 10, {first.motion_s:.2f} s into it (player: {first.program_s:.2f} s)"
+    assert fault.moments[0].when == f"line 10, {first.program_s:.2f} s"
     for each in listed:  # what the index links to
         name, t, place = re.fullmatch(r"programs\.html\?play=(\w+)&t=([\d.]+)#([\w.-]+)", each.address).groups()
         assert name == each.name
@@ -158,6 +158,9 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
         gravest = [own for own in program.findings if own.level == program.outcome]
         timed = [own.program_s for own in gravest if own.program_s]
         ends = motion.take(motion.program == name).t_s.tolist()  # where what is about a line as a whole is seen
+        if any(own.finding.code == "joint_jumps" for own in gravest):  # seen in the middle of its turn
+            ends = [(min(timed) + ends[-1]) / 2]
+            timed = []
         assert float(t) == round(min(timed), 9) if timed and float(t) else float(t) in np.round([0.0, *ends], 9)
     summary = stored["er3a_c60"].results.summary
     program, grave = next((own, each) for own in summary.programs for each in own.findings if each.level == "fail")
@@ -179,9 +182,7 @@ def test_a_line_past_a_singular_pose_is_told_by_it_then_by_what_weighs_most_then
     program = next(each for each in results.summary.programs if each.name == "singular_line")
     found = {each.finding.code: each for each in program.findings}
     passed = found["passes_singularity"]
-    assert fault.cause.startswith(
-        f"line 10, {passed.motion_s:.2f} s into it (player: {passed.program_s:.2f} s): passes"
-    )
+    assert fault.cause.startswith(f"line 10, {passed.program_s:.2f} s: passes")
     assert fault.cause.endswith(": J4 and J6 in line")
     limit, rates = fault.moments
     assert limit.what.startswith("J4 reaches ")

@@ -227,7 +227,7 @@ export class Space extends Orbit {
     const [u, v] = free ?? [x, y];
     this.taken.push([u, v, width, height]);
     const edge = [Math.min(u + width / 2, Math.max(u - width / 2, x)), Math.min(v + height / 2, Math.max(v - height / 2, y))];
-    if (Math.hypot(edge[0] - x, edge[1] - y) > height) this.#svg("line", { x1: x, y1: y, x2: edge[0], y2: edge[1], stroke: css });
+    if (Math.hypot(edge[0] - x, edge[1] - y) > 0.4 * height) this.#svg("line", { x1: x, y1: y, x2: edge[0], y2: edge[1], stroke: css });
     const bar = { x: u - width / 2, y: v + 0.3 * size, height: 0.6 * size, rx: 0.2 * size };
     for (const [part, fill] of share === null ? [] : [[1, this.page.grid], [share, this.page.muted]]) this.#svg("rect", { ...bar, width: part * width, fill });
     this.#svg("text", { x: u, y: share === null ? v : v - 0.4 * size, fill: css, stroke: this.page.halo, "font-size": size }, text);
@@ -237,13 +237,13 @@ export class Space extends Orbit {
   names(meshes, needed = new Set()) {
     const named = meshes.filter(({ shape }) => !shape.pale || needed.has(shape.name)).sort((a, b) => needed.has(b.shape.name) - needed.has(a.shape.name));
     const tops = named.map(({ geometry, matrixWorld }) => {
-      if (!geometry.boundingBox) geometry.computeBoundingBox();
-      const { min, max } = geometry.boundingBox.clone().applyMatrix4(matrixWorld);
-      const [middle, radius] = [scaled(add(min.toArray(), max.toArray()), 0.5), (max.x - min.x) / 2];
-      if (max.distanceTo(min) < 4 * SMALL * this.length) this.keepClear([middle], radius);
-      return [...middle.slice(0, 2), max.z];
+      const { min, max } = (geometry.boundingBox ?? (geometry.computeBoundingBox(), geometry.boundingBox)).clone().applyMatrix4(matrixWorld);
+      const [middle, small] = [scaled(add(min.toArray(), max.toArray()), 0.5), max.distanceTo(min) < 4 * SMALL * this.length];
+      if (small) this.keepClear([middle], (max.x - min.x) / 2);
+      const corners = small || max.z - min.z > max.x - min.x ? [] : [min.x, max.x].flatMap((x) => [min.y, max.y].map((y) => [x, y, max.z])); // of a wide top, on which others stand
+      return corners.filter((at) => (([u, v]) => u > 0 && u < this.width && v < this.height)(this.seen(at))).sort((a, b) => this.seen(b)[1] - this.seen(a)[1])[0] ?? [...middle.slice(0, 2), max.z];
     });
-    named.forEach(({ shape: { name } }, k) => this.word(name, tops[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name) || named.length < 5));
+    named.forEach(({ shape: { name } }, k) => this.word(name, tops[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name) || named.length < 10));
   }
 
   #light() {

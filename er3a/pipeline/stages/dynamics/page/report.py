@@ -17,7 +17,7 @@ from er3a.pipeline.player.motions import at_rest
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
-from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, motions, within
+from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, holding_text, motions, within
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, bars, new_figure
@@ -85,7 +85,7 @@ WITHOUT = words({"load": "load", "friction": "friction", "rotor_inertias": "roto
 def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) -> None:
     """Write the dynamics page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
-    summary = results.summary
+    summary, file = results.summary, str(study.robot_file(stored.robot))
     figures = [
         (path.name, torque_figure(path, results.torques.take(results.torques.path == path.name)))
         for path in summary.paths
@@ -98,12 +98,14 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         study,
         stored,
         output,
-        _answer(robot, results),
+        _answer(robot, results, file),
         payload=payload_text(summary, robot),
         findings=listed(summary.findings),
         links=_links(summary),
         uses=[use_text(use) for use in summary.uses[:MAX_USES]],
         motors=_motors(summary.motors),
+        needs=[_need(results, motor) for motor in summary.motors],
+        file=file,
         limited=_limited(summary),
         paths=[_path(path) for path in summary.paths if path.counts],
         not_run=joined((path.name for path in summary.paths if not path.counts), ", "),
@@ -132,11 +134,18 @@ def _moment_of(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[
     return str(rows.path[at]), float(rows.t_s[at]), float(rows.tolerance[at, motor.joint - 1])
 
 
+def _need(results: model.DynamicsResults, motor: model.MotorNeed) -> str:
+    """The most that a joint bears, moving or at rest, with the tolerance of that; nothing where no mass is known."""
+    held = results.summary.holding[motor.joint - 1]
+    most = max((motor.peak, _moment_of(results, motor)[2]), (motor.holding, held.tolerance))
+    return with_unit(within(*most), motor.unit) if any(most) else "?"
+
+
 def _worst(motors: Sequence[model.MotorNeed]) -> model.MotorNeed:
     return max(motors, key=lambda motor: motor.peak if motor.unit == motors[0].unit else 0.0)
 
 
-def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
+def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     """The greatest torque that is needed, and that of each joint against its limit."""
     summary = results.summary
     payload = payload_key(summary, robot)
@@ -144,15 +153,14 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
         held = model.hardest_held(summary.holding) if summary.holding else None
         if held is None:
             return Answer(tr("Torques need the links' masses."), tr("None are given."), keys=[payload])
-        size = with_unit(number(abs(held.torque), 2), held.unit)
-        return Answer(tr("J{joint} holds {torque} at most.", joint=held.joint, torque=size), keys=[payload])
+        return Answer(holding_text(held), keys=[payload])
     worst = _worst(summary.motors)
     limited = _limited(summary)
     over = [f"J{motor.joint}" for motor in summary.motors if _mark(motor) == "fail"]
-    headline = tr("Within all limits.") if limited else tr("J{joint} bears most.", joint=worst.joint)
+    bears = tr("J{joint} bears most: {torque}.", joint=worst.joint, torque=_need(results, worst))
+    headline = tr("Within all limits.") if limited else bears
     if over:
         headline = tr("Too much for {joints}.", joints=joined(over, ", "))
-    holding = with_unit(number(worst.holding, 2), worst.unit)
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
     rows = []
@@ -168,16 +176,20 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
         if held.joint == motor.joint
     ]
     left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
+    todo = tr("enter the motors' peak torques in {file}.", file=file)
     return Answer(
         headline,
         "" if limited or over else tr("Motor limits are missing."),
-        tr("Lower bounds: {parts} are missing.", parts=joined(left, ", ")) if left else "",
-        [(holding, tr("J{joint} holding", joint=worst.joint)), payload],
+        tr("± from the masses. Not included: {parts}.", parts=joined(left, ", ")) if left else "",
+        [payload],
         [
             Group(title, [row for row in found if row.length >= SEEN])
-            for title, found in ((tr("Greatest torque on the paths"), rows), (tr("Holding, in the worst pose"), still))
+            for title, found in (
+                (tr("Greatest torque on the paths"), rows),
+                (tr("Holding, in the worst pose found"), still),
+            )
         ],
-        None if limited else Fix(tr("enter the motors' peak torques."), "#motors", False),
+        None if limited else Fix(todo, "#motors", False),
     )
 
 

@@ -9,14 +9,23 @@ from pathlib import Path
 import numpy as np
 
 from er3a.collision.pairs import names_of
-from er3a.finding import Finding, fact, is_one
+from er3a.finding import Finding, is_one
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import times_needed
 from er3a.pipeline.messages.programs import OUT_OF_REACH, rates_text, remedies, singular_cause
 from er3a.pipeline.messages.say import joined, say, say_first
-from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of, at_rest
+from er3a.pipeline.player.motions import (
+    Fault,
+    FaultMoment,
+    Mark,
+    PlayedEvent,
+    PlayedMotion,
+    Weight,
+    address_of,
+    at_rest,
+)
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.planning.motion_faults import rate_ratio
@@ -25,6 +34,7 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 MOMENT = 1e-6  # s
+SHORTLY = 2e-3  # s, before a fault: the player takes less for its moment
 WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "caution", "fail": "fail"}
 
 
@@ -42,11 +52,35 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
             if each.program_s is not None:
                 events += _found_event(program, each, rows)
         if len(rows):
-            motions.append(PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events))
+            safe = _safe_s(program)
+            events.insert(
+                0, PlayedEvent(safe, safe, tr("nothing wrong up to here: {time}", time=_seconds(safe)), "plain")
+            )
+            motions.append(
+                PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events, _missed(program, rows))
+            )
         else:  # nothing of it was carried out: the arm rests
             said = joined([in_few_words(say(each.finding)) for each in program.findings])
             motions.append(at_rest(robot, program.name, said, WEIGHTS[program.outcome]))
     return motions
+
+
+def _safe_s(program: ProgramSummary) -> float:
+    """The last moment (s) before anything is wrong with a program; below 0 where there is none."""
+    wrong = [each.program_s or 0.0 for each in program.findings if WEIGHTS[each.level] != "plain"]
+    return min(wrong, default=0.0) - SHORTLY
+
+
+def _missed(program: ProgramSummary, rows: ProgramMotion) -> list[Mark]:
+    """The ways from where lines end, because they leave what the arm reaches, to their targets."""
+    marks = []
+    for found in program.findings:
+        if place := found.finding.params.get("target_m"):
+            tip = rows.xyz_mm[np.searchsorted(rows.t_s, (found.program_s or 0.0) - MOMENT)] / 1000
+            far = fixed(1000 * float(np.linalg.norm(tip - place)), 0)
+            text = tr("target, {far} mm off", far=far)
+            marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(place), text))
+    return marks
 
 
 def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion) -> list[PlayedEvent]:
@@ -55,8 +89,8 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
     finding, weight = found.finding, WEIGHTS[found.level]
     if is_one(finding, "meets_singularity", "passes_singularity"):
         return [PlayedEvent(start, start, singular_cause(finding), weight)]
-    end = min((t1 for _, _, t0, t1 in stretches(rows) if t0 - MOMENT <= start <= t1 + MOMENT), default=start)
-    end = max(start, end)
+    own = [t1 for line, _, t0, t1 in stretches(rows) if t0 - MOMENT <= start <= t1 + MOMENT and line == found.line]
+    end = max(start, min(own, default=start))
     if is_one(finding, "motion_collides"):
         begun = start - (found.motion_s or 0.0)  # of the line's motion
         touches = [(begun + each.t_s, each.pair) for each in finding.touches]
@@ -121,7 +155,7 @@ def _of_passes(results: ProgramsResults, program: ProgramSummary, found: Finding
     own = (rows.program == program.name) & (rows.line == found.line) & (Path(program.file).name == found.file)
     if found not in short or sum(each.times for each in short) >= rows.times[own].sum():
         return found
-    return replace(found, finding=fact("later_out_of_reach", reasons=found.finding.reasons))
+    return replace(found, finding=replace(found.finding, code="later_out_of_reach"))
 
 
 def faults(results: ProgramsResults) -> list[Fault]:
@@ -134,8 +168,10 @@ def faults(results: ProgramsResults) -> list[Fault]:
             continue
         first, worst = wrong[0], min(wrong, key=lambda each: -RANKS[each.level])
         cause = _cause(program, first) or _cause(program, worst)
+        lines = stretches(results.motion.take(results.motion.program == program.name))
         shown = [worst] if worst.level == first.level else [worst, first]
-        moments = tuple(_moment(program, each) for each in shown)
+        moments = tuple(_moment(program, each, lines) for each in shown)
+        safe = _safe_s(program)
         collides = is_one(worst.finding, "motion_collides")
         found.append(
             Fault(
@@ -146,7 +182,8 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 moments,
                 joined(dict.fromkeys(_to_do(program, each) for each in shown), " "),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
-                cause=cause,
+                (_seconds(safe), address_of("programs", program.name, 0.0, program.name, safe)) if safe > 0 else None,
+                cause,
             )
         )
     return found
@@ -172,9 +209,11 @@ def _cause(program: ProgramSummary, found: FindingAt) -> str:
     return next(iter(said), "")
 
 
-def _moment(program: ProgramSummary, found: FindingAt) -> FaultMoment:
-    """A finding with its line and its time; joints of a line that are too fast together."""
+def _moment(program: ProgramSummary, found: FindingAt, lines: list[tuple[int, Level, float, float]]) -> FaultMoment:
+    """A finding with its line and its time, of a turn its middle; joints of a line that are too fast together."""
     text, seen, where = say_first(found.finding), found.program_s, _where(program, found)
+    if is_one(found.finding, "joint_jumps", "whole_turn") and seen is not None:
+        seen = next(((t0 + t1) / 2 for line, _, t0, t1 in lines if line == found.line and t1 > seen), seen)
     row = line_id(program.name, found.line) if found.line and found in of_line(program, found.line) else ""
     if is_one(found.finding, "too_fast") and seen is not None:
         text = rates_text(_paces(program, found))
@@ -189,10 +228,11 @@ def _where(program: ProgramSummary, found: FindingAt) -> str:
     line = tr("line {line}", line=found.line)
     if found not in of_line(program, found.line):
         return joined([found.file, line], ", ")
-    if found.program_s is None or found.motion_s is None:
-        return line
-    own, clock = fixed(found.motion_s, 2), fixed(found.program_s, 2)
-    return tr("{line}, {own} s into it (player: {clock} s)", line=line, own=own, clock=clock)
+    return line if found.program_s is None else f"{line}{tr(', ')}{_seconds(found.program_s)}"
+
+
+def _seconds(time: float) -> str:
+    return tr("{time} s", time=fixed(time, 2))
 
 
 def line_id(program: str, line: int) -> str:

@@ -138,13 +138,10 @@ def _remark(name: str, each: model.FindingAt) -> Markup:
         else say(each.finding)
     )
     text = escape(bracketed(said, often))
-    if each.motion_s is None:
+    if each.program_s is None:
         return text
-    at = tr("from {time} s into this line on", time=fixed(each.motion_s, 2))
-    if each.program_s is not None:
-        at = bracketed(at, tr("player: {time} s", time=fixed(each.program_s, 2)))
-    shown = escape(at) if each.program_s is None else moment(name, each.program_s, at)
-    return Markup("<b>{}</b>{}{}").format(shown, tr(": "), text)
+    at = moment(name, each.program_s, tr("{time} s", time=fixed(each.program_s, 2)))
+    return Markup("<b>{}</b>{}{}").format(at, tr(": "), text)
 
 
 def _listing(

@@ -23,7 +23,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
@@ -120,11 +120,12 @@ def _errors(each: model.ObjectResult, limit: float) -> dict[str, Any]:
     return {"of": each.name, "title": title, "rows": rows, "counted": False}
 
 
+RESIDUALS = "#figure-residuals"
 AXES = ("x", "y", "z")
 PARTS = {
     "together": N_("error, all together"),
     "camera": N_("camera's noise"),
-    "table": N_("arm's table"),
+    "table": N_("D-H table"),
     "calibration": N_("calibration"),
     "repeatability": N_("repeatability"),
 }
@@ -135,7 +136,8 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
     task = load_vision(str(study.entry(name).vision))
-    robot, answer = study.robot(name), _answer(results, task)
+    file = study.scene_file(name, stored.stage)
+    robot, answer = study.robot(name), _answer(results, task, file)
     rows = [row for group in answer.shown_groups for row in group.rows]
     first = "fail" if summary.verdict.status == "fail" else "pass"  # else what is not grasped is not to be
     render_stage(
@@ -145,6 +147,8 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         answer,
         errors=[_errors(each, min(task.gripper.tolerance_mm)) for each in summary.objects],
         found=found,
+        file=file,
+        left_out=[f"{each.sample}{tr(': ')}{_why_left_out(each)}" for each in found.suspects] if found else [],
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
         touched=_touched(found.touch) if found and found.touch else [],
@@ -163,18 +167,15 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     )
 
 
-def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
+def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) -> Answer:
     """How many objects can be grasped, what that leaves open, and how well the camera's place is known."""
     summary = results.summary
     grasped = [each for each in summary.objects if each.grasp]
-    caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
-    due, found = len(summary.objects) - len(caught), summary.calibration
-    headline, below = tr("{count} of {due} can be grasped.", count=len(grasped), due=due), ""
+    caught = all(each.grasp or each.outcome == each.expect for each in summary.objects)
+    found = summary.calibration
+    headline = tr("{count} of {all} objects can be grasped.", count=len(grasped), all=len(summary.objects))
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
-    rest = all_caught(len(caught))
-    if summary.verdict.status == "caution":  # what was not checked comes before both
-        below, rest = rest, ""
     keys, limit = [], min(task.gripper.tolerance_mm)
     sure = [(each.grasp.probability, each.error_mm, each.name) for each in grasped if each.grasp and each.error_mm]
     if sure:
@@ -182,34 +183,39 @@ def _answer(results: model.VisionResults, task: VisionFile) -> Answer:
         made = (
             tr("error at the grasp, 95 %, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
         )
-        keys = [(_succeed(least), name), (with_unit(f"{fixed(error.together, 1)} / {limit:g}", "mm"), made)]
+        keys = [
+            (f"{fixed(100 * least, 1)} %", tr("least success: {name}", name=name)),
+            (with_unit(f"{fixed(error.together, 1)} / {limit:g}", "mm"), made),
+        ]
     elif found:
         half = fixed(max(found.hand_eye.half_width_mm), 2)
         place = f"{_listed(found.hand_eye.xyz_mm, 0)} ± {half}"
         keys = [(with_unit(place, "mm"), tr("camera's place, 95 %"))]
-    shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
+    gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
+    fix = Fix(tr("describe the gripper in {file}.", file=scene), "#carried", False) if "gripper" in gaps else None
+    shown = [_row(each, grasp_moment(results, each), fix) for each in summary.objects]
     groups = [
-        Group(tr("Can't be grasped"), [row for row in shown if row.mark == "fail"]),
+        Group(
+            tr("Can't be grasped, as expected") if caught else tr("Can't be grasped"),
+            [row for row in shown if row.mark == "fail"],
+        ),
         Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
-    if found and (found.suspects or found.warnings):
-        rows = [ListRow("caution", each.sample, _why_left_out(each), "#figure-residuals") for each in found.suspects]
-        rows += [ListRow("caution", tr("camera"), say(each)) for each in found.warnings]
+    if found:
+        rows = [ListRow("caution", tr("camera"), say(each)) for each in found.warnings]
+        if not shown:
+            rows += [ListRow("caution", each.sample, _why_left_out(each), RESIDUALS) for each in found.suspects]
         groups.append(Group(tr("Doubts"), rows))
-    gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
-    text = tr("give the tool a shape (“carried”).")
-    return Answer(headline, rest, below, keys, groups, Fix(text, "#carried", False) if "gripper" in gaps else None)
+    return Answer(headline, "", "", keys, groups, fix)
 
 
-def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
-    """An object: how surely it is grasped, or why it is not."""
-    if each.grasp is None:
-        return ListRow("fail", each.name, refusal_text(each), "#objects", moment)
-    return ListRow("pass", each.name, _succeed(each.grasp.probability), "#objects", moment)
-
-
-def _succeed(probability: float) -> str:
-    return tr("{percent} % succeed", percent=fixed(100 * probability, 1))
+def _row(each: model.ObjectResult, moment: tuple[str, float], fix: Fix | None) -> ListRow:
+    """An object: how surely it is grasped, else why it is not, and what to do."""
+    if each.grasp:
+        text = tr("{percent} % succeed", percent=fixed(100 * each.grasp.probability, 1))
+        return ListRow("pass", each.name, text, "#objects", moment, fix=fix)
+    instead = tr("Move {name} elsewhere in reach, or allow another grasp.", name=each.name)
+    return ListRow("fail", each.name, refusal_text(each), "#objects", moment, fix=Fix(instead))
 
 
 def _why_left_out(found: Finding) -> str:
