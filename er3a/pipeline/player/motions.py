@@ -166,7 +166,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0) -
     seen, motion = fault.moments[0].seen_s, motion if motion and len(motion.t) > 1 else None
     parts = bar_of(motion, duration_s) if motion else []
     events = motion.events if motion else ()
-    gravest = min(((each.t, each.until) for each in events if each.status == "fail"), default=None)
+    gravest = min(((each.t, each.until) for each in events if each.status == fault.status), default=None)
     fix = fix_of([fault])
     if fix and not fix.address and gravest and gravest[0] < gravest[1]:  # what is wrong is played
         fix = replace(fix, address=fault.address.replace("#", f"&until={gravest[1]:.9g}#"))
@@ -175,7 +175,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0) -
         fault.name,
         fault.verdict,
         f"#{fault.name}",
-        (fault.name, gravest[0] if gravest else seen or 0.0) if motion else None,
+        (fault.name, gravest[0] if gravest and fault.status == "fail" else seen or 0.0) if motion else None,
         float(bool(parts)),
         parts,
         fix,

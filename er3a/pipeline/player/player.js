@@ -267,7 +267,7 @@ function newMotion() {
   part("controls").classList.toggle("rests", new Set(motion.values.flat().map(String)).size === arms.length);
   Object.assign(bar, { min: String(start()), max: String(whole()), step: "any" });
   const beyond = { t: end(), until: whole(), status: "none", text: motion.events.at(-1)?.text || motion.name };
-  const ticks = [...(whole() > end() ? [beyond] : []), ...motion.events].map((event) => {
+  const ticks = [...(whole() - end() > ROUNDED ? [beyond] : []), ...motion.events].map((event) => {
     const at = (value) => Math.min(100, (100 * (value - start())) / (whole() - start() || 1));
     const tick = Object.assign(document.createElement("button"), { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
     tick.style.left = `min(${at(event.t)}%, 100% - 0.6rem)`; // what is at the end is seen too
