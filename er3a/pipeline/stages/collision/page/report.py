@@ -82,12 +82,12 @@ def _answer(
     hit, clear, partly = (
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
+    marked = zip(closest, rows)
     counted = (
+        (N_("Paths among them: {count}."), sum(each.kind == "path" for each, row in marked if row in clear)),
         (N_("{count} can't be reached whole."), len(partly)),
         (N_("{count} targets collide in every solution."), blocked := len(params.get("blocked", ()))),
     )
-    marked = zip(closest, rows)
-    poses = sum(each.kind == "target" for each, row in marked if row in clear)
     caught = len(params.get("demonstrations", ()))
     due = len(rows) + blocked - caught - len(partly)
     least = next((each for each in closest if each.clearance_mm >= 0), None)
@@ -101,13 +101,7 @@ def _answer(
         keys.append((with_unit(fixed(free, 0), "%"), tr("joint space free")))
     titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
     return Answer(
-        tr(
-            "{count} of {due} are clear (poses: {poses}, paths: {paths}).",
-            count=len(clear),
-            due=due,
-            poses=poses,
-            paths=len(clear) - poses,
-        )
+        tr("{count} of {due} poses and paths are clear.", count=len(clear), due=due)
         if due
         else tr("Collisions checked."),
         all_caught(caught),

@@ -117,8 +117,8 @@ def _row(target: model.TargetResult) -> ListRow:
     if target.outcome == "reached":
         mark = "caution" if _singular(target) else "pass"
     advice = listed(target.advice) if mark == "fail" else ()
-    shown = target.neighbours and target.neighbours.shifted_to_mm  # the player opens with the arm there
-    fix = Fix(advice[-1], address_of("inverse", target.name, 0.0, target.name) if shown else "") if advice else None
+    shown = target.neighbours and target.neighbours.shifted_to_mm  # the player shows the arm there
+    fix = Fix(advice[-1], address_of("inverse", target.name, 1.0, target.name) if shown else "") if advice else None
     return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
 
 
