@@ -13,6 +13,7 @@ from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.collision.model import Closest, CollisionResults, PathClearances
 from er3a.pipeline.stages.trajectory.model import ClearUntil
+from er3a.pipeline.stages.trajectory.page.played import clear_at_end
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -96,5 +97,4 @@ def nearest(rows: PathClearances, end: ClearUntil | None = None) -> list[Mark]:
 
 
 def _clearance(clearance_mm: float, end: ClearUntil | None = None) -> str:
-    here = tr("{clearance} mm", clearance=fixed(clearance_mm, 1))
-    return tr("{here} here, {after} after the stop", here=here, after=fixed(end.margin_mm, 1)) if end else here
+    return clear_at_end(clearance_mm, end) if end else tr("{clearance} mm", clearance=fixed(clearance_mm, 1))

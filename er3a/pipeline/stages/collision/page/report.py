@@ -82,9 +82,7 @@ def _answer(
     hit, clear, partly = (
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
-    marked = zip(closest, rows)
     counted = (
-        (N_("Paths among them: {count}."), sum(each.kind == "path" for each, row in marked if row in clear)),
         (N_("{count} can't be reached whole."), len(partly)),
         (N_("{count} targets collide in every solution."), blocked := len(params.get("blocked", ()))),
     )

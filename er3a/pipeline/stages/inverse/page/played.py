@@ -40,7 +40,7 @@ def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> 
     events = [_solution_event(rows, k) for k in range(len(rows))]
     events = events or [PlayedEvent(0.0, SHOWN_S, outcome_word(target.outcome), "fail")]
     if len(q) > len(events):
-        events.append(PlayedEvent(1.0, 1.0 + SHOWN_S, tr("The arm reaches the place that is moved to."), "plain"))
+        events.append(PlayedEvent(1.0, 1.0 + SHOWN_S, outcome_word("reached"), "plain"))
     marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
     if near and near.shifted_to_mm and near.least_shift_mm:
         marks.append(_line(near.shifted_to_mm, target.xyz_mm, short_of(near.least_shift_mm), len(q)))

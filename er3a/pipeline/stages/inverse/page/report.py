@@ -164,7 +164,7 @@ def _solutions_listed(
 def _move(branches: model.SolutionRows, k: int) -> str:
     """How far the joint turns that turns farthest, and whether the solution is the one chosen."""
     far = with_unit(fixed(branches.greatest_move_deg[k], 0), "deg")
-    return tr("{move}, chosen", move=far) if branches.rank[k] == 1 else far
+    return joined([far, tr("chosen") if branches.rank[k] == 1 else ""], ", ")
 
 
 def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:

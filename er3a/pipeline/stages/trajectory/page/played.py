@@ -94,9 +94,13 @@ def _safe_end(path: model.PathSummary, clearance: model.Clearances) -> list[Play
     if end is None or last is None or end.t_s < last.t_s:
         return []
     rows = clearance.take((clearance.path == path.name) & (clearance.strategy == ""))
-    far = fixed(float(np.interp(end.t_s, rows.t_s, rows.clearance_mm)), 1)
-    text = tr("Safe up to here: {far} mm clear, {after} mm after the stop", far=far, after=fixed(last.margin_mm, 1))
+    text = clear_at_end(float(np.interp(end.t_s, rows.t_s, rows.clearance_mm)), last)
     return [PlayedEvent(end.t_s, end.t_s, text, "plain")]
+
+
+def clear_at_end(far_mm: float, end: model.ClearUntil) -> str:
+    """How clear a path that meets something is where it may end."""
+    return tr("{here} mm clear here, {after} mm after the stop", here=fixed(far_mm, 1), after=fixed(end.margin_mm, 1))
 
 
 def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:

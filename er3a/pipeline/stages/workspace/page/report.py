@@ -51,7 +51,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         turning=workspace_figures.in_space(robot, results, scene, trays),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
-        tray_lines=placing.tray.lines if placing else "",
+        tray_lines=placing.tray.lines if placing and settled else "",
         **capability_context(robot, results, placing, payload),
     )
 
@@ -100,14 +100,14 @@ def _key_of(void: model.VoidSummary, name: str) -> tuple[str, str]:
     low, high = (1000 * bound for bound in (void.volume_m3.lower, void.volume_m3.upper))
     texts = [f"{(low + high) / 2:.{digits}g}" for digits in range(1, 9)]
     about = next((text for text in texts if low <= float(text) <= high), texts[-1])
-    return tr("about {size} L", size=about), tr("{name}: normal", name=name) if void.holds_shoulder else name
+    return tr("about {size} L", size=about), tr("{what}: normal", what=name) if void.holds_shoulder else name
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: which one, how large."""
     note = with_unit(workspace_figures.litres(void), "L")
     if void.holds_shoulder:
-        note = tr("{size}: normal", size=note)
+        note = tr("{what}: normal", what=note)
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
 
 
