@@ -98,9 +98,9 @@ def _answer(
 def _key_of(void: model.VoidSummary, name: str) -> tuple[str, str]:
     """About how large a void is, in the fewest digits that keep within its bounds, and what it is called."""
     low, high = (1000 * bound for bound in (void.volume_m3.lower, void.volume_m3.upper))
-    texts = [f"{(low + high) / 2:.{digits}g}" for digits in range(1, 9)]
-    about = next((text for text in texts if low <= float(text) <= high), texts[-1])
-    return tr("about {size} L", size=about), tr("{what}: normal", what=name) if void.holds_shoulder else name
+    sizes = [float(f"{(low + high) / 2:.{digits}g}") for digits in range(1, 9)]
+    about = next((size for size in sizes if low <= size <= high), high)
+    return tr("about {size:g} L", size=about), tr("{what}: normal", what=name) if void.holds_shoulder else name
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
