@@ -75,7 +75,7 @@ def motions(
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
             text = repair_lead(path, slowed(path, rows, repair))
             q = meant(robot, repair.q_deg)
-            seen = [*added(repaired(path)), *_nearest(path.chosen.motion and path.chosen.motion.clearance)]
+            seen = [*added(repaired(path)), *_nearest(path.chosen.motion.clearance if path.chosen.motion else None)]
             motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, seen))
     return motions
 

@@ -123,7 +123,7 @@ def answer_of(
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
     faulty, others = paths[: len(wrong)], paths[len(wrong) :]
-    fault_rows, repairable = [], []
+    fault_rows, repairable = list[ListRow](), list[ListRow]()
     for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
         hinders = path.name in hindered
