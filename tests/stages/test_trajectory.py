@@ -45,7 +45,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.pipeline.stages.trajectory.motion import limits_of, planned_entries, planning_of
-from er3a.pipeline.stages.trajectory.page.played import faults
+from er3a.pipeline.stages.trajectory.page.played import events, faults, motions
 from er3a.pipeline.stages.trajectory.page.record import record
 from er3a.pipeline.stages.trajectory.page.report import answer_of, report, strategies_shown
 from er3a.pipeline.stages.workspace.page.tray import Meeting
@@ -658,6 +658,17 @@ def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, st
         text = gzip.decompress(base64.b64decode(packed)).decode()
         told = "er3a: meets the tray that the workspace page places at 0.21 s" in text
         assert told == (file.startswith("line_limits_repaired") and not file.endswith((".dat", ".var")))
+
+
+def test_a_collision_paints_the_pair_that_its_text_names_and_its_safe_end_is_said(study, results):
+    found = results["er3a_c60"]
+    path = by_name(found)["line_collides"]
+    (collision,) = (event for event in events(path) if event.bodies)
+    assert collision.bodies == ("link_4", "post")
+    assert collision.text == "collision: link 4 and post"
+    played = {each.name: each for each in motions(study.robot("er3a_c60"), found)}["line_collides"]
+    (end,) = (event for event in played.events if event.t == path.sound_end.t_s)
+    assert end.text.endswith(f"{path.clear_until.margin_mm:.1f} mm after the stop")
 
 
 def test_the_readme_tells_of_the_path_that_it_shows_as_the_stage_does(results):

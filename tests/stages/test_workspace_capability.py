@@ -13,6 +13,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Box, Plane, Scene
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
+from er3a.files.scene_file import load_scene
 from er3a.files.yaml_file import load
 from er3a.finding import is_one
 from er3a.geometry.transforms import transform
@@ -23,7 +24,7 @@ from er3a.pipeline.stages.workspace.compute import _assumed
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.stages.workspace.model import CellLookup
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
-from er3a.pipeline.stages.workspace.page.tray import placing
+from er3a.pipeline.stages.workspace.page.tray import placing, trays
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
@@ -52,6 +53,16 @@ def context_of(robot: Robot, found: ToolCapability) -> dict:
     results = SimpleNamespace(summary=summary, capability=found.cells, places=found.places)
     placed = placing({"workspace": SimpleNamespace(results=results)}, robot, {}, {})
     return capability_context(robot, results, placing=placed)
+
+
+@pytest.mark.long
+def test_lines_of_a_tray_are_the_tray_in_a_scene_file(done, tmp_path):
+    (tray, *_) = trays(SimpleNamespace(summary=SimpleNamespace(placement=done.placement)))
+    (tmp_path / "scene.yaml").write_text(f"kind: scene\ntitle: Tray\n{tray.lines}\n", encoding="utf-8")
+    for read, meant in zip(load_scene(tmp_path / "scene.yaml").solids, tray.parts, strict=True):
+        assert read.name == meant.name
+        np.testing.assert_allclose(read.T, meant.T, atol=1e-6)
+        np.testing.assert_allclose(read.size, meant.size, atol=1e-6)
 
 
 @pytest.mark.long

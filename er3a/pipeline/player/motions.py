@@ -144,10 +144,11 @@ def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:
     motion : with its events
     duration_s : that the whole bar stands for, s; the part that the motion does not get to is marked ``none``
     """
-    whole = max(duration_s, float(motion.t[-1])) or 1.0
+    last = float(motion.t[-1])
+    whole = max(duration_s, last) or 1.0
     order = sorted((each for each in motion.events if each.status != "plain"), key=lambda each: each.status == "fail")
     parts = [Part(each.t / whole, each.until / whole, "fail" if each.status == "fail" else "caution") for each in order]
-    end = float(motion.t[-1]) / whole
+    end = last / whole
     return [*([Part(end, 1.0, "none")] if end < 0.995 else []), *parts]
 
 
@@ -163,19 +164,20 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0) -
     -------
     row : without a bar where no moment of the motion is known to fail
     """
-    seen, motion = fault.moments[0].seen_s, motion if motion and len(motion.t) > 1 else None
+    motion = motion if motion and len(motion.t) > 1 else None
     parts = bar_of(motion, duration_s) if motion else []
+    fails = fault.status == "fail"
     events = motion.events if motion else ()
-    gravest = min(((each.t, each.until) for each in events if each.status == "fail"), default=None)
+    gravest = min(((each.t, each.until) for each in events if each.status == fault.status), default=None)
     fix = fix_of([fault])
     if fix and not fix.address and gravest and gravest[0] < gravest[1]:  # what is wrong is played
         fix = replace(fix, address=fault.address.replace("#", f"&until={gravest[1]:.9g}#"))
     return ListRow(
-        "fail" if fault.status == "fail" else "caution",
+        "fail" if fails else "caution",
         fault.name,
         fault.verdict,
         f"#{fault.name}",
-        (fault.name, gravest[0] if gravest else seen or 0.0) if motion else None,
+        (fault.name, gravest[0] if gravest and fails else fault.moments[0].seen_s or 0.0) if motion else None,
         float(bool(parts)),
         parts,
         fix,

@@ -131,7 +131,7 @@ function draw() {
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && (touching.has(mesh.shape.name) ? SEEN_THROUGH : FAINT));
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   const moves = motion.trails[0].some((point) => Math.hypot(...subtract(point, motion.trails[0][0])) >= CLOSED * data.size);
-  for (const trail of moves ? motion.trails : []) space.line(trail, page.ink, 2);
+  for (const trail of moves ? motion.trails : []) space.line(trail, wrong ? (trail === motion.trails[0] ? page.touching : page.accent) : page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
     if (status === "plain" || from >= Math.min(until, end())) continue;
     const times = [from, ...motion.times.filter((time) => time > from && time < until), Math.min(until, end())];
@@ -236,7 +236,7 @@ function tellJoints() {
   const values = valuesAt(motion.times, motion.values[0], t).map((value, j) => value * (table.slides[j] ? 1000 : 180 / Math.PI));
   const rooms = data.joints.map(({ lower, upper }, i) => (lower === null ? Infinity : Math.min(values[i] - lower, upper - values[i])));
   const fails = failing();
-  const quiet = fails.size === 0 && !motion.events.some((event) => isNow(event) && (event.status === "fail" || event.bodies.length));
+  const quiet = !unjudged && fails.size === 0 && !motion.events.some((event) => isNow(event) && (event.status === "fail" || event.bodies.length));
   const least = new Map();
   data.joints.forEach(({ unit }, i) => (rooms[i] < (rooms[least.get(unit)] ?? Infinity) ? least.set(unit, i) : null));
   const withUnit = (value, unit) => fixed(value, 1) + (unit === "°" ? unit : ` ${unit}`);
@@ -267,7 +267,7 @@ function newMotion() {
   part("controls").classList.toggle("rests", new Set(motion.values.flat().map(String)).size === arms.length);
   Object.assign(bar, { min: String(start()), max: String(whole()), step: "any" });
   const beyond = { t: end(), until: whole(), status: "none", text: motion.events.at(-1)?.text || motion.name };
-  const ticks = [...(whole() > end() ? [beyond] : []), ...motion.events].map((event) => {
+  const ticks = [...(whole() - end() > ROUNDED ? [beyond] : []), ...motion.events].map((event) => {
     const at = (value) => Math.min(100, (100 * (value - start())) / (whole() - start() || 1));
     const tick = Object.assign(document.createElement("button"), { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
     tick.style.left = `min(${at(event.t)}%, 100% - 0.6rem)`; // what is at the end is seen too

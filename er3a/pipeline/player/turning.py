@@ -69,7 +69,7 @@ class Solids:
 def surroundings(robot: Robot, scene: Scene | None, ways: Sequence[Any]) -> list[Solids]:
     """The arm with all joints at 0 and dimensions of its reach, and what is around it."""
     at_zero = poses_at(robot, np.zeros(robot.joints))
-    solids = [Solids(tr("arm at 0"), drawn_arm(robot)["looks"]["checked"], at_zero, BODY, ways=ways)]
+    solids = [Solids(tr("arm"), drawn_arm(robot)["looks"]["checked"], at_zero, BODY, ways=ways)]
     if scene:
         solids.append(Solids(own_title(scene.title), drawn_scene(scene.solids, robot), np.eye(4)[None], SCENE_COLOUR))
     return solids

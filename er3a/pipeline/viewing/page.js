@@ -285,7 +285,7 @@ function keepInAddress(queries, place) {
   const address = new URL(location.href);
   for (const [name, value] of Object.entries(queries)) value ? address.searchParams.set(name, value) : address.searchParams.delete(name);
   if (place) ["play", "t", "until"].forEach((name) => address.searchParams.delete(name)); // of another choice
-  if (place) address.hash = encodeURIComponent(place);
+  if (place || queries.play) address.hash = encodeURIComponent(place ?? "");
   history.replaceState(history.state, "", address);
 }
 
@@ -723,14 +723,14 @@ const mark = (shown) => {
 // A row's own name; several may show one motion, each another moment of it.
 const nameOf = (row) => row.querySelector("b").textContent;
 const other = (row) => new URLSearchParams(row.dataset.instead?.split(/[?#]/)[1]).get("play"); // that it leads to instead
-const playing = (name) => rows.find((row) => row.dataset.play === name) ?? rows.find((row) => name && other(row) === name);
-const choose = (row, name) => {
+const playing = (name, t) => rows.find((row) => row.dataset.play === name && row.dataset.t === t) ?? rows.find((row) => row.dataset.play === name) ?? rows.find((row) => name && other(row) === name);
+const choose = (row, play, t) => {
   mark(row);
-  keepInAddress({}, name);
+  keepInAddress({ play, t, until: "" }); // no place: who opens it sees the first screen
 };
-for (const row of rows) row.addEventListener("click", () => (row.dataset.play ? choose(row, nameOf(row)) : mark(row)));
-const named = addressed();
-mark(playing(new URLSearchParams(location.search).get("play")) ?? rows.find((row) => nameOf(row) === named || row.hash === location.hash) ?? playing(named || document.querySelector(".player")?.dataset.opened) ?? rows[0]);
+for (const row of rows) row.addEventListener("click", () => (row.dataset.play ? choose(row, row.dataset.play, row.dataset.t) : mark(row)));
+const [named, asked] = [addressed(), new URLSearchParams(location.search)];
+mark(playing(asked.get("play"), asked.get("t")) ?? rows.find((row) => nameOf(row) === named || row.hash === location.hash) ?? playing(named || document.querySelector(".player")?.dataset.opened) ?? rows[0]);
 const follow = ({ detail }) => rows.some((row) => row.ariaCurrent && row.dataset.play === detail) || choose(playing(detail), detail);
 addEventListener("player", () => addEventListener("motion", follow)); // the first one is not of the reader's choice
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from er3a.pipeline.language import tr
@@ -10,6 +12,8 @@ from er3a.pipeline.messages.say import sentence
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.collision.model import Closest, CollisionResults, PathClearances
+from er3a.pipeline.stages.trajectory.model import ClearUntil
+from er3a.pipeline.stages.trajectory.page.played import clear_at_end
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -17,15 +21,18 @@ MOMENT = 1e-6  # s
 TOUCHING = 1e-3  # mm: far above what is left where bodies first touch
 
 
-def motions(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
-    """The paths, as far as the arm reaches them, with the line between the nearest points at each moment."""
+def motions(robot: Robot, results: CollisionResults, ends: Mapping[str, ClearUntil]) -> list[PlayedMotion]:
+    """The paths, as far as the arm reaches them, with the line between the nearest points at each moment; ``ends``: up
+    to where those that meet something may be run."""
     motions = []
     for name in dict.fromkeys(results.paths.path.tolist()):
         own = results.paths.take(results.paths.path == name)
         rows = own.take(np.isfinite(own.q_deg.sum(axis=1)))
         q = meant(robot, rows.q_deg)
         motions.append(
-            PlayedMotion(name, "", rows.t_s, q, events(results, name, rows), nearest(rows), whole_s=own.t_s[-1])
+            PlayedMotion(
+                name, "", rows.t_s, q, events(results, name, rows), nearest(rows, ends.get(name)), whole_s=own.t_s[-1]
+            )
         )
     return motions
 
@@ -71,22 +78,23 @@ def _least(found: Closest) -> PlayedEvent:
     return PlayedEvent(t, t, text, "plain")
 
 
-def nearest(rows: PathClearances) -> list[Mark]:
-    """The nearest points, each pair shown until the next was measured."""
+def nearest(rows: PathClearances, end: ClearUntil | None = None) -> list[Mark]:
+    """The nearest points, each pair shown until the next was measured; at the ``end`` that a path may have also how
+    clear it is after the stop."""
     until = np.append(rows.t_s[1:], rows.t_s[-1:])
     until[-2:-1] -= MOMENT  # the last pair alone is shown at the end
     return [
-        Mark(t0, t1, start, end, _clearance(clearance))
-        for t0, t1, start, end, clearance in zip(
+        Mark(t0, t1, start, other, _clearance(clearance, end if end and t0 <= end.t_s < t1 else None))
+        for t0, t1, start, other, clearance in zip(
             rows.t_s.tolist(),
             until.tolist(),
             np.round(rows.from_mm / 1000, 5).tolist(),
             np.round(rows.to_mm / 1000, 5).tolist(),
             rows.clearance_mm.tolist(),
         )
-        if np.isfinite(start).all() and np.isfinite(end).all()
+        if np.isfinite(start).all() and np.isfinite(other).all()
     ]
 
 
-def _clearance(clearance_mm: float) -> str:
-    return tr("{clearance} mm", clearance=fixed(clearance_mm, 1))
+def _clearance(clearance_mm: float, end: ClearUntil | None = None) -> str:
+    return clear_at_end(clearance_mm, end) if end else tr("{clearance} mm", clearance=fixed(clearance_mm, 1))

@@ -14,15 +14,16 @@ from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.motions import at_rest, fix_of
+from er3a.pipeline.player.motions import Fault, at_rest, fix_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.trajectory.model import TrajectoryResults
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, all_caught
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, all_caught
 from er3a.pipeline.viewing.page import render_stage
 from er3a.robots.robot import Robot
 
@@ -38,7 +39,10 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
     # A path of which a part can't be reached is clear of nothing.
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
-    answer = _answer(summary, closest, unreached, _advice(stored.folder))
+    judged = _judged(stored.folder)
+    known = {fault.name: fault for fault in faults(judged)} if judged else {}
+    ends = {path.name: path.clear_until for path in judged.summary.paths if path.clear_until} if judged else {}
+    answer = _answer(summary, closest, unreached, known)
     render_stage(
         study,
         stored,
@@ -49,7 +53,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         tried=TRIED,
         player=player(
             robot,
-            [*motions(robot, results), *poses(robot, results)] or [at_rest(robot, own_title(robot.title))],
+            [*motions(robot, results, ends), *poses(robot, results)] or [at_rest(robot, own_title(robot.title))],
             scene,
             opened=next((group.rows[0].play for group in answer.shown_groups), None),
         ),
@@ -63,17 +67,18 @@ def _answer(
     summary: model.CollisionSummary,
     closest: Sequence[model.Closest],
     unreached: set[str],
-    advice: Mapping[str, Fix],
+    known: Mapping[str, Fault],
 ) -> Answer:
     """How many paths and chosen solutions are clear of everything, and how near each comes.
 
     What collides as its file expects is named, and so is a path of which only a part was measured: that is clear of
-    nothing. ``unreached``: these; ``advice``: what may be run instead of a path, by its name.
+    nothing. ``unreached``: these; ``known``: what the page of paths says of those that may not be run, by
+    their names.
     """
     params = summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
     most = max((abs(each.clearance_mm) for each in closest), default=1.0) or 1.0
-    rows = [_row(each, unreached, near, advice, most) for each in closest]
+    rows = [_row(each, unreached, near, known.get(each.name), most) for each in closest]
     hit, clear, partly = (
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
@@ -94,7 +99,9 @@ def _answer(
         keys.append((with_unit(fixed(free, 0), "%"), tr("joint space free")))
     titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
     return Answer(
-        tr("{count} of {due} cases are clear.", count=len(clear), due=due) if due else tr("Collisions checked."),
+        tr("{count} of {due} poses and paths are clear.", count=len(clear), due=due)
+        if due
+        else tr("Collisions checked."),
         all_caught(caught),
         joined([tr(text, count=count) for text, count in counted if count], " "),
         keys,
@@ -103,26 +110,21 @@ def _answer(
     )
 
 
-def _advice(folder: Path | None) -> dict[str, Fix]:
-    """What may be run instead of each path that may not, by its name: the part or the repair that the page of paths
-    shows.
-
-    Parameters
-    ----------
-    folder : of the stage's results, in that of the robot's
-    """
+def _judged(folder: Path | None) -> TrajectoryResults | None:
+    """What the stage of paths found, None where it was not computed; ``folder``: of the stage's results, in that of
+    the robot's."""
     paths = folder.parent / "trajectory" if folder else None
     if paths is None or not is_computed(paths):
-        return {}
-    found = faults(read_stage(paths, STAGES["trajectory"]).results)
-    return {fault.name: fix for fault in found if fault.instead and (fix := fix_of([fault]))}
+        return None
+    found: TrajectoryResults = read_stage(paths, STAGES["trajectory"]).results
+    return found
 
 
 def _row(
     found: model.Closest,
     unreached: set[str],
     near: Sequence[str],
-    advice: Mapping[str, Fix],
+    fault: Fault | None,
     most_mm: float,
 ) -> ListRow:
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
@@ -134,7 +136,10 @@ def _row(
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     if of_path and found.name in unreached and mark != "fail":
         mark = "none"
-    fix = advice.get(found.name) if mark == "fail" and of_path else None
+    fault = fault if of_path else None
+    if fault and mark == "pass":
+        note = tr("{note}; Paths: {verdict}", note=note, verdict=fault.verdict)
+    fix = fix_of([fault]) if fault and fault.instead and mark == "fail" else None
     length = abs(found.clearance_mm) / most_mm
     return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, fix=fix)
 

@@ -36,14 +36,18 @@ def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> 
     if near and near.shifted_to_mm:
         pose = transform(np.array(near.shifted_to_mm) / 1000, np.radians(target.rpy_deg))
         found = inverse(robot, pose, q[0])
-        q = found.q[found.within_limits][:1] if found.within_limits.any() else q
+        q = np.repeat(found.q[found.within_limits][:1] if found.within_limits.any() else q, 2, axis=0)
     events = [_solution_event(rows, k) for k in range(len(rows))]
     events = events or [PlayedEvent(0.0, SHOWN_S, outcome_word(target.outcome), "fail")]
+    if len(q) > len(events):
+        events.append(PlayedEvent(1.0, 1.0 + SHOWN_S, outcome_word("reached"), "plain"))
     marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
     if near and near.shifted_to_mm and near.least_shift_mm:
         marks.append(_line(near.shifted_to_mm, target.xyz_mm, short_of(near.least_shift_mm), len(q)))
     t = np.arange(len(q))[:, None] + [0.0, SHOWN_S]
-    return PlayedMotion(target.name, "", t.ravel(), np.repeat(q, 2, axis=0), events, marks, ghosts=list(q[:MAX_GHOSTS]))
+    return PlayedMotion(
+        target.name, "", t.ravel(), np.repeat(q, 2, axis=0), events, marks, ghosts=list(q[: min(MAX_GHOSTS, len(rows))])
+    )
 
 
 def short_of(far_mm: float) -> str:

@@ -16,6 +16,7 @@ from er3a.pipeline.messages.inverse import NEAREST_RULE
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, listed, say
+from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
@@ -116,7 +117,8 @@ def _row(target: model.TargetResult) -> ListRow:
     if target.outcome == "reached":
         mark = "caution" if _singular(target) else "pass"
     advice = listed(target.advice) if mark == "fail" else ()
-    fix = Fix(advice[-1], f"#{target.name}") if advice else None
+    shown = target.neighbours and target.neighbours.shifted_to_mm  # the player shows the arm there
+    fix = Fix(advice[-1], address_of("inverse", target.name, 1.0, target.name) if shown else "") if advice else None
     return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
 
 
@@ -149,14 +151,20 @@ def _solutions_listed(
     shares = np.where(ways == 1.0, 0.5, (meant(robot, branches.q_deg) - robot.lower) / ways)
     return [
         (
-            "fail" if branches.refusal[k] else "caution" if singular[k] else "pass" if branches.rank[k] == 1 else "",
+            "fail" if branches.refusal[k] else "caution" if singular[k] else "pass",
             stretch(target, k, k + SHOWN_S),
             moment(target, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
             shares[k].clip(-OVER, 1 + OVER).tolist(),
-            _outcome(branches, k, with_unit(fixed(branches.greatest_move_deg[k], 0), "deg")),
+            _outcome(branches, k, _move(branches, k)),
         )
         for k in range(len(branches))
     ]
+
+
+def _move(branches: model.SolutionRows, k: int) -> str:
+    """How far the joint turns that turns farthest, and whether the solution is the one chosen."""
+    far = with_unit(fixed(branches.greatest_move_deg[k], 0), "deg")
+    return joined([far, tr("chosen") if branches.rank[k] == 1 else ""], ", ")
 
 
 def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:

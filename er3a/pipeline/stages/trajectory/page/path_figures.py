@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from er3a.finding import Finding
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
 from er3a.pipeline.viewing.figures import axis_label, new_figure
@@ -64,10 +65,14 @@ def nearness_picture(
         margin = shapes.margin_mm
         text = tr("assumed shapes may be off by {mm:g} mm", mm=margin)
         ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.25, linewidth=0, label=text)
-        ax.legend(**KEY)
+    _key(ax)
     ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
     far = fixed(least.least_mm, 1)
     caption = tr("Least: {far} mm at {t:.2f} s, {pair}.", far=far, t=least.t_s, pair=say(least.between))
+    if path and path.sound_end:
+        end = path.sound_end.t_s
+        until = float(np.interp(end, rows.t_s, rows.clearance_mm))
+        caption = joined([caption, tr("At {t:.2f} s: {far} mm.", t=end, far=fixed(until, 1))], " ")
     ax.set_xlim(0.0, rows.t_s[-1])
     ax.set_xlabel(axis_label(rows, "t_s"))
     ax.set_ylabel(axis_label(rows, "clearance_mm"))
@@ -100,9 +105,9 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
             linewidth=0,
             label=tr("off the path") if off.any() else None,
         )
-        ax.legend(ncols=2, **KEY)
     else:
         _mark(ax, path)
+    _key(ax)
     ax.plot(rows.t_s, getattr(rows, column), color=palette.MODEL, linewidth=2.2)
     if fast:
         ax.axhline(1.0, color=palette.TOUCHING, linewidth=1.2)
@@ -113,6 +118,12 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
     title = tr("Fastest joint") if fast else tr("Distance from singular poses")
     crosses = before is not None and not fast and path.strategy == "detour"
     return Picture(figure, title, tr("A joint move may cross the singular pose.") if crosses else "", [(ax, name)])
+
+
+def _key(ax: Axes) -> None:
+    """Name what is drawn, if anything has a name."""
+    if ax.get_legend_handles_labels()[1]:
+        ax.legend(ncols=2, **KEY)
 
 
 def _mark(ax: Axes, path: model.PathSummary) -> None:
@@ -126,9 +137,14 @@ def _mark(ax: Axes, path: model.PathSummary) -> None:
     for stretches, colour, alpha in shades:
         for part in stretches:
             ax.axvspan(part.t0_s, part.t1_s, color=colour, alpha=alpha, linewidth=0)
-    for event in path.singularities:
+    for first, event in enumerate(path.singularities):
         ax.axvline(event.t_s, color=palette.HIGHLIGHT, linestyle="-" if event.crossing else ":", linewidth=1.4)
-        at = (event.t_s, 1.0)
         ax.plot(
-            *at, "v", color=palette.HIGHLIGHT, markersize=6, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5
+            *(event.t_s, 1.0, "v"),
+            color=palette.HIGHLIGHT,
+            markersize=6,
+            transform=ax.get_xaxis_transform(),
+            clip_on=False,
+            zorder=5,
+            label=None if first else tr("singular pose"),
         )

@@ -63,9 +63,9 @@ def motions(
         near = near_assumed(path, results.summary)
         text = say(near) if near else path_text(path)
         seen = [*events(path), *_near_events(path, near, results.clearance), *added(path.name)]
-        if path.verdict == "safe" and path.clearance and not near:
-            least = sentence("least_clearance", far_mm=path.clearance.least_mm, pair=path.clearance.between)
-            seen.append(PlayedEvent(path.clearance.t_s, path.clearance.t_s, least, "plain"))
+        if path.verdict == "safe" and not near:
+            seen += _nearest(path.clearance)
+        seen += _safe_end(path, results.clearance)
         motions.append(
             PlayedMotion(
                 path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path), whole_s=path.duration_s
@@ -75,8 +75,32 @@ def motions(
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
             text = repair_lead(path, slowed(path, rows, repair))
             q = meant(robot, repair.q_deg)
-            motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, added(repaired(path))))
+            seen = [*added(repaired(path)), *_nearest(path.chosen.motion.clearance if path.chosen.motion else None)]
+            motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, seen))
     return motions
+
+
+def _nearest(least: model.MinClearance | None) -> list[PlayedEvent]:
+    """The moment at which a motion is nearest to anything, where that was measured."""
+    if least is None:
+        return []
+    text = sentence("least_clearance", far_mm=least.least_mm, pair=least.between)
+    return [PlayedEvent(least.t_s, least.t_s, text, "plain")]
+
+
+def _safe_end(path: model.PathSummary, clearance: model.Clearances) -> list[PlayedEvent]:
+    """The moment up to which a path that meets something may be run: how clear it is there, and after a stop."""
+    end, last = path.sound_end, path.clear_until
+    if end is None or last is None or end.t_s < last.t_s:
+        return []
+    rows = clearance.take((clearance.path == path.name) & (clearance.strategy == ""))
+    text = clear_at_end(float(np.interp(end.t_s, rows.t_s, rows.clearance_mm)), last)
+    return [PlayedEvent(end.t_s, end.t_s, text, "plain")]
+
+
+def clear_at_end(far_mm: float, end: model.ClearUntil) -> str:
+    """How clear a path that meets something is where it may end."""
+    return tr("{here} mm clear here, {after} mm after the stop", here=fixed(far_mm, 1), after=fixed(end.margin_mm, 1))
 
 
 def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:
@@ -179,7 +203,9 @@ def _to_do(
         return text, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe":
         near = near_assumed(path, summary)
-        return joined([*remedies(path.of_program), tr("Confirm the assumed shapes first.") if near else ""], " "), None
+        pair, mm = (say(near.pair), near.margin_mm) if near else ("", 0.0)
+        measure = tr("Measure {pair}: assumed shapes may be off by {mm:g} mm.", pair=pair, mm=mm) if near else ""
+        return joined([*remedies(path.of_program), measure], " "), None
     last = path.sound_end
     if last is None:
         todo = advised(path, rows)
@@ -332,8 +358,8 @@ def contact(path: model.PathSummary) -> list[Mark]:
 
 
 def _touching(cause: object) -> tuple[str, ...]:
-    touches = cause.touches if is_one(cause, "bodies_overlap") else ()
-    return tuple(dict.fromkeys(name for each in touches for name in names_of(each.pair)))
+    """The bodies that the text of a collision names: those that touch first."""
+    return names_of(cause.touches[0].pair) if is_one(cause, "bodies_overlap") else ()
 
 
 def _singular(event: model.Singularity) -> str:

@@ -15,7 +15,7 @@ from er3a.pipeline.language import own_title, tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.trajectory import (
     kind_word,
     path_text,
@@ -23,7 +23,7 @@ from er3a.pipeline.messages.trajectory import (
     strategy_text,
     strategy_word,
 )
-from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, fix_of, opened, row_of
+from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, opened, row_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -123,15 +123,11 @@ def answer_of(
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
     faulty, others = paths[: len(wrong)], paths[len(wrong) :]
-    fault_rows, repairable = [], []
+    fault_rows, repairable = list[ListRow](), list[ListRow]()
     for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
-        if path.name in hindered:
-            fault_rows.append(replace(row, fix=None))
-        elif path.chosen:
-            repairable.append(replace(row, mark="caution"))
-        else:
-            fault_rows.append(row)
+        hinders = path.name in hindered
+        (repairable if path.chosen and not hinders else fault_rows).append(replace(row, fix=None) if hinders else row)
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [replace(_sound_row(path), mark="fail", note=as_expected(path)) for path in others if path not in sound]
     groups = judged([*unlike, *fault_rows, *map(_sound_row, sound)], repairable)
@@ -139,8 +135,11 @@ def answer_of(
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance of passing paths"))] if clear else []
-    fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
-    return Answer(headline, rest, "", keys, groups, fix)
+    doubts = sum(row.mark == "caution" and not wrong[row.name].meant for row in fault_rows)
+    doubted = tr("{count} in doubt.", count=doubts) if doubts else ""
+    fixes = {row.name: row.fix for row in (*fault_rows, *repairable)}
+    fix = next((fix for path in faulty if (fix := fixes[path.name])), None)
+    return Answer(headline, joined([doubted, rest], " "), "", keys, groups, fix)
 
 
 def _sound_row(path: model.PathSummary) -> ListRow:

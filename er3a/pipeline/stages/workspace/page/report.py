@@ -34,7 +34,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     there = tr("What the arm can carry at the tray was not examined.")
     payload = joined([payload_text(known, robot), there], " ")
     trays = [each.tray for each in placing.tried] if placing else []
-    answer = _answer(summary, placing, [] if known else [payload_key(known, robot)])
+    settled = stored.rests_on.get("validation") != "unsettled"
+    answer = _answer(summary, placing, [] if known else [payload_key(known, robot)], settled)
     arms = [(robot, results)]
     instead = alternative_table(study, stored.robot, stored.folder) if contradicted else None
     if instead and (right := found_by(stored, "workspace", f"../{instead}")):
@@ -50,6 +51,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         turning=workspace_figures.in_space(robot, results, scene, trays),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
+        tray_lines=placing.tray.lines if placing and settled else "",
         **capability_context(robot, results, placing, payload),
     )
 
@@ -65,12 +67,15 @@ def _labelled(
     return workspace_figures.labelled(arms, floor_mm, contradicted)
 
 
-def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: Sequence[tuple[str, str]]) -> Answer:
-    """How far the arm reaches, its voids, where the tray goes, and the ``payload`` where no other page says it."""
+def _answer(
+    summary: model.WorkspaceSummary, placing: Placing | None, payload: Sequence[tuple[str, str]], settled: bool
+) -> Answer:
+    """How far the arm reaches, its voids, where the tray goes, and the ``payload`` where no other page says it;
+    ``settled``: whether documents settle anything of the table, or else no place of the tray passes."""
     # The void that the picture shows comes first.
     in_order = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     volume, voids = summary.volume_m3, [_void_as_row(*each) for each in in_order]
-    rest, fix, rows = "", None, _tray_as_rows(placing)
+    rest, fix, rows = "", None, _tray_as_rows(placing, settled)
     if summary.voids:
         rest = tr("Voids: {count}.", count=len(summary.voids))
     if placing and rows[0].mark == "pass":
@@ -79,7 +84,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
         rest = joined([rest, whole_sentence(tr("{tray} fits", tray=tray.name))], " ")
         fix = Fix(tr("add the tray and its stand to the scene at {centre} mm.", centre=centre), "#tray-1", False)
     keys = [
-        *((void.note, void.name) for void in voids[:1]),
+        *(_key_of(void, row.name) for (_, void), row in zip(in_order[:1], voids)),
         (
             with_unit(fixed(volume.middle, 2), "m³"),
             tr("± {half} m³, proven", half=fixed(volume.upper - volume.middle, 2)),
@@ -90,15 +95,23 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: S
     return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups, fix)
 
 
+def _key_of(void: model.VoidSummary, name: str) -> tuple[str, str]:
+    """About how large a void is, in the fewest digits that keep within its bounds, and what it is called."""
+    low, high = (1000 * bound for bound in (void.volume_m3.lower, void.volume_m3.upper))
+    sizes = [float(f"{(low + high) / 2:.{digits}g}") for digits in range(1, 9)]
+    about = next((size for size in sizes if low <= size <= high), high)
+    return tr("about {size:g} L", size=about), tr("{what}: normal", what=name) if void.holds_shoulder else name
+
+
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: which one, how large."""
     note = with_unit(workspace_figures.litres(void), "L")
     if void.holds_shoulder:
-        note = tr("{size}: normal", size=note)
+        note = tr("{what}: normal", what=note)
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
 
 
-def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
+def _tray_as_rows(placing: Placing | None, settled: bool) -> list[ListRow]:
     """The best place of the tray on each surface; one row that says so where there is none."""
     if placing is None:
         return [ListRow("caution", tr("nowhere"), tr("no place fits"), "#placement")]
@@ -107,7 +120,9 @@ def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
         blocked = sum(map(len, placing.hindered(tried).values()))
         centre = millimetres(tried.tray.place.centre_m)
         note = tr("{centre} mm; blocks {count}/{all} motions", centre=centre, count=blocked, all=placing.passing)
-        rows.append(ListRow("caution" if blocked else "pass", tried.tray.name, note, f"#tray-{number_}"))
+        rows.append(
+            ListRow("pass" if settled and not blocked else "caution", tried.tray.name, note, f"#tray-{number_}")
+        )
     return rows
 
 

@@ -101,6 +101,16 @@ class Tray:
         )
 
     @property
+    def lines(self) -> str:
+        """It and its stand as lines of a scene file."""
+        boxes = [
+            (box.name, *(np.round(1000 * each, 3).tolist() for each in (box.size, box.T[:3, 3]))) for box in self.parts
+        ]
+        return "\n".join(
+            ["boxes:", *(f"  - {{name: {name}, size_mm: {size}, xyz_mm: {at}}}" for name, size, at in boxes)]
+        )
+
+    @property
     def edges(self) -> str:
         """Its edges along x, y and z, mm."""
         return " × ".join(as_text(1000 * edge, ".6g") for edge in self.place.size_m)
