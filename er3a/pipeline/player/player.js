@@ -212,7 +212,7 @@ function tell() {
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : motion.text;
-  show(nowShown, now[0]?.text || ends); // the first fault is the cause
+  show(nowShown, (now[0]?.status === "plain" ? now.at(-1) : now[0])?.text || ends); // the first fault is the cause
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
