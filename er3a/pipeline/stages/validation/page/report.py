@@ -300,11 +300,9 @@ def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[
         return tr("Sources disagree."), tr("Measure before you rely on it.")
     if status == "no_reference":
         return tr("Nothing to check against."), tr("Find documents or measure.")
-    if unsure:
-        count, known = (
-            len(to_confirm(summary.evidence)),
-            [part.settled or part.up_to_signs for part in summary.evidence.parts],
-        )
+    if unsure and summary.evidence:
+        count = len(to_confirm(summary.evidence))
+        known = [part.settled or part.up_to_signs for part in summary.evidence.parts]
         first = tr("Good for planning.") if any(known) else tr("Not settled.")
         return first, tr("Points to confirm before the arm moves: {count}.", count=count)
     return tr("This D-H table is right."), tr("Documents settle every entry.")
