@@ -216,7 +216,7 @@ class Head:
         if self.no_verdict:
             return "no_verdict"
         if self.status != "pass":  # a table about which documents disagree is worse than one of which part is open
-            return "conflict" if self.status == "caution" and getattr(self.summary, "conflicts", ()) else self.status
+            return "conflict" if self.status == "caution" and getattr(self.summary, "conflicts", None) else self.status
         first = self.caveats.get("validation")
         if first is not None and first.status == "unsettled":
             return "caution"

@@ -300,7 +300,7 @@ def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[
         return tr("Sources disagree."), tr("Measure before you rely on it.")
     if status == "no_reference":
         return tr("Nothing to check against."), tr("Find documents or measure.")
-    if unsure:
+    if unsure and summary.evidence:
         count, known = (
             len(to_confirm(summary.evidence)),
             [part.settled or part.up_to_signs for part in summary.evidence.parts],
