@@ -211,7 +211,7 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
 @pytest.mark.parametrize(
     ("page", "text"),
     [
-        ("er3a_c60/validation.html", "Entries that are not settled"),  # a caption in a folded section
+        ("er3a_c60/validation.html", "Five poses to read at the pendant"),
         ("er3a_c60_article/validation.html", "Failed, worst first"),
         ("er3a_c60/trajectory.html", "Verdict and figures in full"),
         ("er3a_c60/teach.html", "Tool pose"),
