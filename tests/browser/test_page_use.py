@@ -438,7 +438,7 @@ def test_the_chosen_row_is_in_the_address(browser, small_study, stage):
     shown_row(browser)
     rows = browser.find_elements(By.CSS_SELECTOR, ".runs a[data-play]")
     browser.execute_script("arguments[0].click()", rows[1])
-    WebDriverWait(browser, PAUSE).until(lambda _: "#" in browser.current_url)
+    WebDriverWait(browser, PAUSE).until(lambda _: "play=" in browser.current_url)
     chosen = shown_row(browser)
     browser.refresh()
     assert shown_row(browser) == chosen

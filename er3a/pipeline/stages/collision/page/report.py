@@ -99,9 +99,7 @@ def _answer(
         keys.append((with_unit(fixed(free, 0), "%"), tr("joint space free")))
     titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
     return Answer(
-        tr("{count} of {due} poses and paths are clear.", count=len(clear), due=due)
-        if due
-        else tr("Collisions checked."),
+        tr("{count} of {due} poses and paths clear.", count=len(clear), due=due) if due else tr("Collisions checked."),
         all_caught(caught),
         joined([tr(text, count=count) for text, count in counted if count], " "),
         keys,
@@ -138,7 +136,7 @@ def _row(
         mark = "none"
     fault = fault if of_path else None
     if fault and mark == "pass":
-        note = tr("{note}; Paths: {verdict}", note=note, verdict=fault.verdict)
+        note = tr("{far} mm; Paths: {verdict}", far=fixed(found.clearance_mm, 1), verdict=fault.verdict)
     fix = fix_of([fault]) if fault and fault.instead and mark == "fail" else None
     length = abs(found.clearance_mm) / most_mm
     return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, fix=fix)
