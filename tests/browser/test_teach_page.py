@@ -368,7 +368,7 @@ def test_an_arm_outside_the_class_says_why_it_has_no_solutions(browser, folder, 
     monkeypatch.setattr("er3a.pipeline.study.Study.robot", lambda study, name: skew)
     panel = Panel(browser, folder / "skew.html").open("#q=10,20,30,40,50,60")
     assert "axes 2 and 3 are not parallel" in panel.text(".solutions")
-    assert panel.text("#warning") == WORDS["clear"]
+    assert panel.text("#warning") == WORDS["touch"]["at"]
     assert panel.joints() == pytest.approx([10, 20, 30, 40, 50, 60])
     assert panel.clean()
 
@@ -416,7 +416,7 @@ def test_the_chinese_panel_warns_in_chinese_alone(browser, folder, chinese):
     for degrees, told in (
         ((0, 0, 0, 0, 0, 0), "处于腕部奇异：轴 4 与轴 6 平行"),
         ((10, 20, 30, 40, 3, 0), "接近腕部奇异：轴 4 与轴 6 距平行还差 3.0°。"),
-        ((30, -20, 15, 40, 60, 10), "附近没有奇异。"),
+        ((30, -20, 15, 40, 60, 10), "此位形无碰触、无超限、无奇异。"),
     ):
         panel.move(*degrees)
         panel.until(lambda told=told: panel.text("#warning").startswith(told))

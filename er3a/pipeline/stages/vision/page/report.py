@@ -192,7 +192,7 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
         place = f"{_listed(found.hand_eye.xyz_mm, 0)} ± {half}"
         keys = [(with_unit(place, "mm"), tr("camera's place, 95 %"))]
     gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
-    fix = Fix(tr("describe the gripper in {file}.", file=scene), "#carried", False) if "gripper" in gaps else None
+    fix = Fix(tr("describe the gripper: {file}", file=scene), "#carried", False) if "gripper" in gaps else None
     shown = [_row(each, grasp_moment(results, each), fix) for each in summary.objects]
     groups = [
         Group(
@@ -214,7 +214,7 @@ def _row(each: model.ObjectResult, moment: tuple[str, float], fix: Fix | None) -
     if each.grasp:
         text = tr("{percent} % succeed", percent=fixed(100 * each.grasp.probability, 1))
         return ListRow("pass", each.name, text, "#objects", moment, fix=fix)
-    instead = tr("Move {name} elsewhere in reach, or allow another grasp.", name=each.name)
+    instead = tr("Move {name}, or allow another grasp.", name=each.name)
     return ListRow("fail", each.name, refusal_text(each), "#objects", moment, fix=Fix(instead))
 
 
