@@ -343,7 +343,9 @@ def test_page_and_recording_show_every_target(folders, tmp_path):
         assert f'<h2 id="{target.name}">' in page
     played = json.loads(re.search(r'id="player-data">(.*?)</script>', page)[1])["motions"]
     assert [motion["name"] for motion in played] == [target.name for target in targets]
-    assert [len(motion["times"]) // 2 for motion in played] == [max(1, target.solutions) for target in targets]
+    assert [len(motion["times"]) // 2 for motion in played] == [
+        target.solutions or 2 for target in targets
+    ]  # else as near as it comes
     assert not re.search(r"\bnan\b", page.split("<main")[1].split("<script")[0])
     run.show("record", "inverse", make_study(), name, folders[name], tmp_path / "inverse.rrd")
     rerun = Path(sys.executable).with_name("rerun")

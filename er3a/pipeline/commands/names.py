@@ -23,7 +23,7 @@ _GROUPS = {
         "check": "Check input files: print the kind of each file, or its error; of a URDF also the "
         "rules that it breaks.",
         "run": "Run the study in this folder; finished parts are not run again.",
-        "verdicts": "Print the verdict of each stage of each robot.",
+        "verdicts": "Print the verdict of each stage of each robot, and what to confirm before the arm moves.",
         "view": "Open the recordings in the Rerun viewer, or, without a desktop, serve them to a browser.",
     },
     ("compare_arms", ROBOT_FILES): {
