@@ -67,7 +67,7 @@ def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
             assert summary["format_version"] == FORMAT_VERSION
             assert (summary["robot"], summary["stage"]) == (robot, stage)
             assert summary["verdict"]["status"] in ("pass", "caution", "fail", "no_reference")
-            assert set(summary["verdict"]) <= {"status", "code", "params", "missed", "shapes"}
+            assert set(summary["verdict"]) <= {"status", "code", "params", "missed", "shapes", "lowered"}
             for figure in summary["figures"]:
                 assert {"name", "value", "unit", "uncertainty", "of"} == set(figure)
             assert summary["provenance"]["inputs"][0]["path"] == f"data/robots/{robot}.yaml"
