@@ -166,15 +166,20 @@ def verdicts(
     if as_json:
         options.print_json([asdict(verdict) for verdict in found])
     else:
-        wrong = {"no verdict": "The table is contradicted."}
         rows = (
-            (each.robot, each.stage, each.shown, each.text if every else wrong.get(each.shown, each.answer))
+            (
+                each.robot,
+                each.stage,
+                each.shown,
+                each.text if every else {"no verdict": "The table is contradicted."}.get(each.shown, each.answer),
+            )
             for each in found
         )
         options.print_table(("robot", "stage", "verdict", "finding"), rows)
-        for robot in dict.fromkeys(each.robot for each in found if each.stage == "validation" and each.checked):
-            if first := condition_of(results / robot / "validation")[0]:
-                print(f"{robot}: {first}")
+        for each in found:
+            open_table = each.stage == "validation" and each.status in ("caution", "no_reference")
+            if first := open_table and condition_of(results / each.robot / each.stage)[0]:
+                print(f"{each.robot}: {first}")
         if changed := [*dict.fromkeys(name for each in found for name in each.outdated)]:
             options.print_note(f"changed since ({', '.join(changed)}): run the study again")
     if fail_on:
