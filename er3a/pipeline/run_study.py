@@ -126,6 +126,7 @@ class RunLog(LogHandlerBase):
             job = record.__dict__
             name, logs = job.get("rule_msg") or job.get("rule_name"), [str(log) for log in job.get("log") or ()]
             number = self._killed.get(logs[0], 0) if logs else 0
+            # SIGKILL is 9, a name that Windows lacks.
             reason = f"killed (signal {number}{'; out of memory?' * (number == 9)})"
             self._print(f"✗ {name}: {reason if number else 'ended with an error'}; see {', '.join(logs)}")
             if number and (log := Path(logs[0])).is_file():

@@ -68,10 +68,15 @@ class StageVerdict:
     foundation: Foundation | None = None
 
     @property
+    def no_verdict(self) -> bool:
+        """Whether it would let something pass that rests on a contradicted table."""
+        return self.foundation == "fail" and self.status in ("pass", "caution")
+
+    @property
     def shown(self) -> str:
         """The status in words, and whether it is as expected; which stage says more where it is another; none where the
         table is contradicted."""
-        if self.foundation == "fail" and self.status in ("pass", "caution"):
+        if self.no_verdict:
             return "no verdict"
         by = self.said_by or ("validation" if self.foundation == "unsettled" and self.status == "pass" else "")
         status = f"see {by}" if by else self.status.replace("_", " ")
@@ -96,7 +101,7 @@ class StageVerdict:
     def is_skipped(self) -> bool:
         """Whether nothing was judged: not examined yet, no reference, a stage that does not apply to the robot, or one
         that would pass what rests on a contradicted table."""
-        absent = self.status in (NOT_EXAMINED, "no_reference", "not_computed") or self.shown == "no verdict"
+        absent = self.status in (NOT_EXAMINED, "no_reference", "not_computed") or self.no_verdict
         return absent and not (self.broken or self.is_otherwise)
 
     def counts(self, level: Level) -> bool:

@@ -166,15 +166,9 @@ def verdicts(
     if as_json:
         options.print_json([asdict(verdict) for verdict in found])
     else:
-        rows = (
-            (
-                each.robot,
-                each.stage,
-                each.shown,
-                each.text if every else {"no verdict": "The table is contradicted."}.get(each.shown, each.answer),
-            )
-            for each in found
-        )
+        short = ["The table is contradicted." if each.no_verdict else each.answer for each in found]
+        said = [each.text for each in found] if every else short
+        rows = ((each.robot, each.stage, each.shown, text) for each, text in zip(found, said))
         options.print_table(("robot", "stage", "verdict", "finding"), rows)
         for each in found:
             open_table = each.stage == "validation" and each.status in ("caution", "no_reference")

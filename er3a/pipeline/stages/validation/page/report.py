@@ -302,7 +302,8 @@ def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[
         return tr("Nothing to check against."), tr("Find documents or measure.")
     if unsure and summary.evidence:
         count = len(to_confirm(summary.evidence))
-        known = [part.settled or part.up_to_signs for part in summary.evidence.parts]
+        geometry = (part for part in summary.evidence.parts if part.part == "geometry")  # as the index decides
+        known = [part.settled or part.up_to_signs for part in geometry]
         first = tr("Good for planning.") if any(known) else tr("Not settled.")
         return first, tr("Points to confirm before the arm moves: {count}.", count=count)
     return tr("This D-H table is right."), tr("Documents settle every entry.")
