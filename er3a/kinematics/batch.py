@@ -24,7 +24,7 @@ from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import Method, Solutions, in_doubt, slot_labels
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots, wrist_partition_missing
-from er3a.numerics.arrays import Flags, Reals, as_floats
+from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import kernel, parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
@@ -107,12 +107,15 @@ def inverse_batch(
     return replace(solutions, method=in_doubt(solutions.method), certain=~failing) if failing.any() else solutions
 
 
-def _confirm(robot: Robot, T: Reals, q: Reals, inside: Flags, threads: int) -> Flags:
-    """Let only such rows of ``q`` (N, S, n) out as forward kinematics confirms.
+def _confirm(
+    robot: Robot, T: Reals, q: Reals, inside: Flags, threads: int, of: Integers | slice = slice(None)
+) -> Flags:
+    """Let only such rows of ``q`` (N, S, n), of these poses, out as forward kinematics confirms.
 
     Returns whether each pose (N,) had others.
     """
-    failing, poses = np.zeros(len(T), dtype=bool), to_be_confirmed(robot, T, q, threads)
+    failing = np.zeros(len(T), dtype=bool)
+    poses = np.arange(len(T))[of][to_be_confirmed(robot, T[of], q[of], threads)]
     if not poses.size:
         return failing
     rows, lost = confirmed(robot, np.repeat(T[poses], q.shape[1], axis=0), q[poses].reshape(-1, robot.joints))
@@ -164,7 +167,7 @@ def _by_class(
             near = missed_row(robot, T[n], reference[0 if len(reference) == 1 else n])
             if near.solved:
                 q[n, 0], inside[n, 0] = near.q, within(robot, near.q)
-        certain = is_complete(robot, found.certainty) & ~_confirm(robot, T, q, inside, threads)
+        certain = is_complete(robot, found.certainty) & ~_confirm(robot, T, q, inside, threads, found.unconfirmed)
         method = fact("by_class", arm_class=solver.code, certain=bool(certain.all()), named=bool(slot_labels(robot)))
     valid = np.isfinite(q[..., 0])
     branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)

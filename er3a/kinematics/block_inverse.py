@@ -170,13 +170,13 @@ Chain = tuple[Reals, Reals]  # joints (3, 6) as of ``joints_for_blocks``, and li
 
 # Rows of scratch memory; a row holds one number of each pose of the block. Offsets are constants, so that the compiler
 # sees that rows don't overlap.
-_Z6, _X6, _PLANE, _MARK, _RIGID, _POSE_ROWS = 12, 15, 18, 19, 20, 21  # the pose itself (3 x 4) comes first
+_Z6, _X6, _PLANE, MARK, _RIGID, _POSE_ROWS = 12, 15, 18, 19, 20, 21  # the pose itself (3 x 4) comes first
 _COS_1, _SIN_1, _ACROSS, _BEND, _COS_BEND, _SIN_BEND, _REACHED, _SIDE_ROWS = range(8)
-_VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles each, whether solved, each within limits
+VALID, WITHIN, PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles each, whether solved, each within limits
 
 
 @kernel
-def solve_blocks(  # noqa: C901, PLR0912
+def solve_blocks(
     arm: BlockConstants,
     chain: Chain,
     limits: tuple[Reals, Reals],
@@ -198,23 +198,16 @@ def solve_blocks(  # noqa: C901, PLR0912
     """
     q, valid, within, rigid, marked = out
     pose, sides = np.empty(_POSE_ROWS * BLOCK), np.empty((2, _SIDE_ROWS * BLOCK))
-    pairs, reference, moved = np.empty((4, _PAIR_ROWS * BLOCK)), np.empty(6 * BLOCK), np.empty((7, SCRATCH))
+    pairs, reference, moved = np.empty((4, PAIR_ROWS * BLOCK)), np.empty(6 * BLOCK), np.empty((7, SCRATCH))
     fill_start(moved, chain[1][0])
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
+        fill_poses(T, start, size, pose)
         for i in range(BLOCK):
-            # The last block is filled up with its last pose, so that all loops have one length.
             n = start + min(i, size - 1)
-            for r in range(3):
-                for c in range(4):
-                    pose[(4 * r + c) * BLOCK + i] = T[n, r, c]
             last = abs(T[n, 3, 0]) + abs(T[n, 3, 1]) + abs(T[n, 3, 2]) + abs(T[n, 3, 3] - 1.0)
             pose[_RIGID * BLOCK + i] = last
-        if start == 0 or q_ref.shape[0] > 1:
-            for i in range(BLOCK):
-                n = min(start + min(i, size - 1), q_ref.shape[0] - 1)
-                for j in range(6):
-                    reference[j * BLOCK + i] = q_ref[n, j]
+        fill_reference(q_ref, start, size, reference)
         _check(pose)
         _shoulder(arm, pose, sides[0], sides[1])
         for pair in range(4):
@@ -222,18 +215,49 @@ def solve_blocks(  # noqa: C901, PLR0912
             if pair % 2 == 0:
                 _elbow(arm, pose, side)
             _wrist(arm, pose, side, 1.0 - 2.0 * (pair % 2), pairs[pair])
-            _manufacturers_angles(chain[0], limits, reference, pairs[pair])
-            _confirm(chain, pairs[pair], moved, pose)
+            manufacturers_angles(chain[0], limits, reference, pairs[pair])
+            confirm_pair(chain, pairs[pair], int(3), moved, pose)  # noqa: RUF046, UP018  (see inner_kernel)
             for i in range(size):
                 for row in range(6):
                     q[start + i, 2 * pair, row] = pairs[pair, row * BLOCK + i]
                     q[start + i, 2 * pair + 1, row] = pairs[pair, (6 + row) * BLOCK + i]
                 for k in range(2):
-                    valid[start + i, 2 * pair + k] = pairs[pair, _VALID * BLOCK + i] > 0.0
-                    within[start + i, 2 * pair + k] = pairs[pair, (_WITHIN + k) * BLOCK + i] > 0.0
+                    valid[start + i, 2 * pair + k] = pairs[pair, VALID * BLOCK + i] > 0.0
+                    within[start + i, 2 * pair + k] = pairs[pair, (WITHIN + k) * BLOCK + i] > 0.0
         for i in range(size):
             rigid[start + i] = pose[_RIGID * BLOCK + i] > 0.0
-            marked[start + i] = pose[_MARK * BLOCK + i] > 0.0
+            marked[start + i] = pose[MARK * BLOCK + i] > 0.0
+
+
+@inner_kernel
+def fill_poses(T: Reals, start: int, size: int, w: Reals) -> None:
+    """The upper three rows of a block of poses, as its first twelve rows. Kernel.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m
+    start, size : of the block; the last one is filled up with its last pose, so that all loops have one length
+    w : filled
+    """
+    for i in range(BLOCK):
+        for row in range(12):
+            w[row * BLOCK + i] = T[start + min(i, size - 1), row // 4, row % 4]
+
+
+@inner_kernel
+def fill_reference(q_ref: Reals, start: int, size: int, w: Reals) -> None:
+    """References of a block of poses, six rows; a single one is filled in once. Kernel.
+
+    Parameters
+    ----------
+    q_ref : (N or 1, 6), rad
+    start, size : of the block
+    w : filled
+    """
+    if start == 0 or q_ref.shape[0] > 1:
+        for i in range(BLOCK):
+            for j in range(6):
+                w[j * BLOCK + i] = q_ref[min(start + min(i, size - 1), q_ref.shape[0] - 1), j]
 
 
 @inner_kernel
@@ -252,31 +276,48 @@ def _check(w: Reals) -> None:
 
 
 @inner_kernel
-def _manufacturers_angles(joint: Reals, limits: tuple[Reals, Reals], reference: Reals, pair: Reals) -> None:
-    """Angles theta into the manufacturer's, by the nearest turn within the limits (``nearest_equivalent``)."""
+def manufacturers_angles(joint: Reals, limits: tuple[Reals, Reals], reference: Reals, pair: Reals) -> None:
+    """Angles theta into the manufacturer's, by the nearest turn within the limits (``nearest_equivalent``). Kernel.
+
+    Parameters
+    ----------
+    joint : (3, 6), as of ``joints_for_blocks``
+    limits : lower and upper (6,), rad
+    reference : six rows of a block, rad
+    pair : two slots' six angles each and whether both are solved; angles are replaced, NaN where not, and whether each
+        is within the limits is filled in
+    """
     for i in range(BLOCK):
-        pair[_WITHIN * BLOCK + i] = pair[_VALID * BLOCK + i]
-        pair[(_WITHIN + 1) * BLOCK + i] = pair[_VALID * BLOCK + i]
+        pair[WITHIN * BLOCK + i] = pair[VALID * BLOCK + i]
+        pair[(WITHIN + 1) * BLOCK + i] = pair[VALID * BLOCK + i]
     for k in range(2):
         for j in range(6):
             row = (6 * k + j) * BLOCK
             sign, zero, smallest, most = joint[0, j], joint[1, j], limits[0][j], limits[1][j]
-            inside = (_WITHIN + k) * BLOCK
+            inside = (WITHIN + k) * BLOCK
             for i in range(BLOCK):
                 angle = sign * (pair[row + i] - zero)
                 chosen = nearest_turn(angle, reference[j * BLOCK + i], smallest, most)
                 fits = (chosen >= smallest - LIMIT_TOLERANCE) & (chosen <= most + LIMIT_TOLERANCE)
                 pair[inside + i] = pair[inside + i] if fits else 0.0
-                pair[row + i] = chosen if pair[_VALID * BLOCK + i] > 0.0 else np.nan
+                pair[row + i] = chosen if pair[VALID * BLOCK + i] > 0.0 else np.nan
 
 
 @inner_kernel
-def _confirm(chain: Chain, pair: Reals, moved: Reals, w: Reals) -> None:
-    """Mark poses of which forward kinematics of the manufacturer's angles is off; both rows share joints 1 to 3."""
+def confirm_pair(chain: Chain, pair: Reals, shared: int, moved: Reals, w: Reals) -> None:
+    """Mark poses of which forward kinematics of the manufacturer's angles is off. Kernel.
+
+    Parameters
+    ----------
+    pair : as :func:`manufacturers_angles` leaves it
+    shared : how many joints, from the first one on, have equal angles in both slots
+    moved : scratch, as of ``fill_start``
+    w : the poses, twelve rows of a block; row ``MARK`` is set where a solved slot is off
+    """
     joint, links = chain
     for row in range(2):
         u = pair[6 * row * BLOCK : 6 * (row + 1) * BLOCK].reshape(6, BLOCK).T
-        for k in range(3 * row, 6):
+        for k in range(shared * row, 6):
             cos_sin_rows(u, joint, k, moved)
             turn_rows(moved, k, links, BLOCK)
         for r in range(0, 12 * BLOCK, 4 * BLOCK):
@@ -285,7 +326,7 @@ def _confirm(chain: Chain, pair: Reals, moved: Reals, w: Reals) -> None:
                 c, x = moved[6, r + 2 * BLOCK + i], moved[6, r + 3 * BLOCK + i]
                 c, x = c - w[r + 2 * BLOCK + i], x - w[r + 3 * BLOCK + i]
                 denied = not abs(a) + abs(b) + abs(c) + abs(x) <= CONFIRMS / 3
-                w[_MARK * BLOCK + i] = 1.0 if denied & (pair[_VALID * BLOCK + i] > 0.0) else w[_MARK * BLOCK + i]
+                w[MARK * BLOCK + i] = 1.0 if denied & (pair[VALID * BLOCK + i] > 0.0) else w[MARK * BLOCK + i]
 
 
 @inner_kernel
@@ -332,7 +373,7 @@ def _shoulder(arm: BlockConstants, w: Reals, near: Reals, far: Reals) -> None:
         ahead = np.sqrt(max(spare * (radius + abs(k)), 0.0))
         per = 1.0 / square
         w[_PLANE * BLOCK + i] = arm.cos_12 * k - arm.sin_12 * vz - arm.point_2[1]
-        w[_MARK * BLOCK + i] = 1.0 if (radius < NEAR) | (abs(spare) < EDGE) else 0.0
+        w[MARK * BLOCK + i] = 1.0 if (radius < NEAR) | (abs(spare) < EDGE) else 0.0
         near[_COS_1 * BLOCK + i], near[_SIN_1 * BLOCK + i] = (vy * k + vx * ahead) * per, (vy * ahead - vx * k) * per
         far[_COS_1 * BLOCK + i], far[_SIN_1 * BLOCK + i] = (vy * k - vx * ahead) * per, -(vy * ahead + vx * k) * per
         near[_ACROSS * BLOCK + i] = ahead - arm.point_2[0]
@@ -357,7 +398,7 @@ def _elbow(arm: BlockConstants, w: Reals, side: Reals) -> None:
         side[_SIN_BEND * BLOCK + i] = 2.0 * a * d * per
         reached = side[_REACHED * BLOCK + i]
         edge = (abs(far) < EDGE) | (abs(near) < EDGE) | (distance < NEAR)
-        w[_MARK * BLOCK + i] = 1.0 if edge & (reached > 0.0) else w[_MARK * BLOCK + i]
+        w[MARK * BLOCK + i] = 1.0 if edge & (reached > 0.0) else w[MARK * BLOCK + i]
         side[_REACHED * BLOCK + i] = reached if (far > 0.0) & (near > 0.0) else 0.0
 
 
@@ -400,9 +441,9 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
         # Distances from the three singular sets multiply what rounding does to joints 4 and 6.
         share = abs(side[_ACROSS * BLOCK + i] + arm.point_2[0]) * abs(sin_bend) * per_reach
         marked = (edge | (tilt * min(share, 1.0) < NEAR * length)) & (side[_REACHED * BLOCK + i] > 0.0)
-        w[_MARK * BLOCK + i] = 1.0 if marked else w[_MARK * BLOCK + i]
+        w[MARK * BLOCK + i] = 1.0 if marked else w[MARK * BLOCK + i]
         valid = side[_REACHED * BLOCK + i] if (upper > 0.0) & (lower > 0.0) else 0.0
-        pair[_VALID * BLOCK + i] = valid
+        pair[VALID * BLOCK + i] = valid
         upper, lower = max(upper, 0.0), max(lower, 0.0)
         a, d, per = np.sqrt(upper), np.sqrt(lower), 1.0 / (upper + lower)
         phi_5 = 2.0 * arctan2(a, d)

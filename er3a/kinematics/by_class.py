@@ -27,11 +27,13 @@ from er3a.kinematics.classes.class_solvers import (
     ArmClassCode,
     ChainSolver,
     LinkedRows,
+    ParallelAxes,
     Redundancy,
 )
+from er3a.kinematics.classes.parallel_axes import solve_parallel_blocks
 from er3a.kinematics.classes.self_motion import OPEN_ROLL, POSE, POSITION, PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
-from er3a.kinematics.forward import CONFIRMS, forward
+from er3a.kinematics.forward import CONFIRMS, forward, joints_for_blocks
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of, to_rows
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import kernel, parallel_for
@@ -402,12 +404,14 @@ class ClassSlots:
     ----------
     q : (N, S, n), by the turns nearest to the reference; inside : (N, S), whether within the limits
     certainty : (N,); settled : what was examined one by one, by the pose's number
+    unconfirmed : which poses' rows forward kinematics has not confirmed yet
     """
 
     q: Reals
     inside: Flags
     certainty: Integers
     settled: dict[int, Settled]
+    unconfirmed: Integers | slice
 
 
 def slots_of_class(
@@ -432,24 +436,30 @@ def slots_of_class(
     """
     solver = arm_solver(robot)
     count, slots = len(T), solver.chain.slots
-    q, certainty = np.empty((count, slots, robot.joints)), np.empty(count, dtype=np.int64)
+    q, certainty = np.empty((count, slots, robot.joints)), np.full(count, CERTAIN)
     inside = np.empty((count, slots), dtype=bool)
     plain = robot.coupling is None and not robot.combined and not robot.continuous.any()
+    left: Integers | slice = slice(None)
+    if plain and isinstance(solver.chain, ParallelAxes):
+        left = _regular_slots(robot, solver.chain, T, q_ref, threads, (q, inside))
     pendant = robot.direction, joint_starts(robot), robot.sliding, robot.lower, robot.upper
 
     def part(rows: slice) -> None:
-        x, certainty[rows] = solver.chain.rows(T[rows], values[rows])
-        own = q_ref if len(q_ref) == 1 else q_ref[rows]
+        numbers = rows if isinstance(left, slice) else left[rows]
+        x, certainty[numbers] = solver.chain.rows(T[numbers], values[numbers])
+        own = q_ref if len(q_ref) == 1 else q_ref[numbers]
+        found, fits = q[numbers], inside[numbers]  # views of a slice, copies else
         if plain:
-            to_pendant(pendant, np.ascontiguousarray(x), own, q[rows], inside[rows])
+            to_pendant(pendant, np.ascontiguousarray(x), own, found, fits)
         else:
-            q[rows] = nearest_equivalent(robot, to_joints(robot, x), own[:, None])
-            inside[rows] = within(robot, q[rows])
+            found[:] = nearest_equivalent(robot, to_joints(robot, x), own[:, None])
+            fits[:] = within(robot, found)
+        q[numbers], inside[numbers] = found, fits
 
-    parallel_for(count, threads, SMALLEST_PART, part)
+    parallel_for(count if isinstance(left, slice) else len(left), threads, SMALLEST_PART, part)
     settled: dict[int, Settled] = {}
     if not settling:
-        return ClassSlots(q, inside, certainty, settled)
+        return ClassSlots(q, inside, certainty, settled, left)
     alone = not solver.chain.parameters  # self-motions of redundant arms come from `all_motions`
     for n in np.flatnonzero(certainty != CERTAIN).tolist() if alone else ():
         own = q_ref[0 if len(q_ref) == 1 else n]
@@ -460,7 +470,23 @@ def slots_of_class(
     each_its_own = alone and len(q_ref) == count
     own_looked_for = np.arange(count) if each_its_own else np.flatnonzero(certainty != CERTAIN)
     _with_own(robot, T, q_ref, own_looked_for, (q, inside, certainty))
-    return ClassSlots(q, inside, certainty, settled)
+    return ClassSlots(q, inside, certainty, settled, left)
+
+
+def _regular_slots(
+    robot: Robot, chain: ParallelAxes, T: Reals, q_ref: Reals, threads: int, out: tuple[Reals, Flags]
+) -> Integers:
+    """Fill slots and whether they are within the limits by the closed form, confirmed; gives the poses left (k,)."""
+    T, (q, inside), marked = np.ascontiguousarray(T, dtype=float), out, np.empty(len(T), dtype=bool)
+    joints, limits = (joints_for_blocks(robot), constant_links(robot)), (robot.lower, robot.upper)
+
+    def part(rows: slice) -> None:
+        own = np.ascontiguousarray(q_ref if len(q_ref) == 1 else q_ref[rows])
+        pendant = joints, limits, own, inside[rows]
+        solve_parallel_blocks(chain.arm.constants, T[rows], 0.0, pendant, q[rows], marked[rows])
+
+    parallel_for(len(T), threads, SMALLEST_PART, part)
+    return np.flatnonzero(marked)
 
 
 def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tuple[Reals, Flags, Integers]) -> None:

@@ -19,7 +19,7 @@ from er3a.geometry.vectors import Vector, wrap_to_pi
 from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import ArmAngleArm, arm_angles_of, solve_at_arm_angle
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
-from er3a.kinematics.classes.parallel_axes import ThreeParallel, solve_parallel_blocks
+from er3a.kinematics.classes.parallel_axes import ThreeParallel, parallel_rows
 from er3a.kinematics.classes.scara import Gantry, Scara, solve_gantry, solve_scara
 from er3a.kinematics.classes.self_motion import PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, RowsFound
@@ -318,7 +318,7 @@ class ParallelAxes(ChainSolver):
         marked : (N,), where branches meet, so that rounding may have lost both
         unsolved : nothing is said of empty slots
         """
-        return *solve_parallel_blocks(self.arm.constants, T, 0.0), None
+        return *parallel_rows(self.arm, T), None
 
     def seeds(self, T: Reals) -> list[Reals]:
         """Two members of each range of each four-bar, with both elbows.

@@ -17,8 +17,8 @@ from er3a.kinematics.classes.arm_angle import about_z
 from er3a.kinematics.classes.parallel_axes import (
     ParallelConstants,
     ThreeParallel,
+    parallel_rows,
     polish_rows,
-    solve_parallel_blocks,
 )
 from er3a.numerics.arrays import Flags, Reals
 
@@ -115,7 +115,7 @@ def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
         :func:`four_bars` may have a family, of whose each range and elbow the middle is a row
     """
     T = np.ascontiguousarray(T, dtype=float)
-    q, marked = solve_parallel_blocks(arm.constants, T, 0.0)
+    q, marked = parallel_rows(arm, T)
     if len(left := np.flatnonzero(marked)):
         q[left] = _careful_rows(arm, T[left], True)
         for n in left:
@@ -125,7 +125,7 @@ def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
 
 def _careful_rows(arm: ThreeParallel, T: Reals, once: bool) -> Reals:
     """Rows (N, 8, 6) of poses near singular ones, polished as :func:`polish_rows` does."""
-    rows = solve_parallel_blocks(arm.constants, T, arm.constants.near_m)[0]
+    rows = parallel_rows(arm, T, arm.constants.near_m)[0]
     polish_rows(arm.links, size_of(arm.links), T, rows, once)
     return rows
 
@@ -146,7 +146,7 @@ def solve_near_reference(arm: ThreeParallel, T: Reals, x_ref: Reals) -> tuple[Re
     gap : (N, 8), m, by how much W or axis 4 are out of reach in slots without solution, 0 in others
     """
     T = np.ascontiguousarray(T, dtype=float)
-    q, marked = solve_parallel_blocks(arm.constants, T, 0.0)
+    q, marked = parallel_rows(arm, T)
     for n in np.flatnonzero(marked):
         q[n] = _careful_rows(arm, T[n : n + 1], False)[0]
         phi = turn_of_three(arm, x_ref[n])

@@ -25,10 +25,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.vectors import TURN, Vector, dot, in_frame_of
-from er3a.kinematics.chain import axes_of, meeting_point, poses_of, size_of
+from er3a.geometry.vectors import TURN, Vector, dot
+from er3a.kinematics.block_inverse import (
+    MARK,
+    PAIR_ROWS,
+    VALID,
+    WITHIN,
+    Chain,
+    confirm_pair,
+    fill_poses,
+    fill_reference,
+    manufacturers_angles,
+)
+from er3a.kinematics.chain import axes_of, meeting_point, poses_of, rows_at, size_of
 from er3a.kinematics.classes.arm_angle import (
-    BLOCK,
     Rows,
     SphericalConstants,
     spherical_constants,
@@ -36,6 +46,7 @@ from er3a.kinematics.classes.arm_angle import (
     vector_of,
 )
 from er3a.kinematics.classes.polish import newton
+from er3a.kinematics.forward import BLOCK, SCRATCH, fill_start
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import inner_kernel, kernel
@@ -46,13 +57,9 @@ PARALLEL = 1e-9  # rad
 MEETS_M = 1e-9  # by which axes may miss a common point, and lengths that count as none
 SOLVES = 1e-10  # residual, rad and parts of the size, up to which a polished row is kept
 
-_W, _Z6, _X6, _MARK = (
-    0,
-    3,
-    6,
-    9,
-)  # rows of a block: wrist, axis 6, a vector across it, whether left to the careful solver
-_POSE_ROWS = 10
+_W, _Z6, _X6, _POSE_ROWS = 20, 23, 26, 29  # rows of a block: wrist, axis 6, a vector across it; the pose comes first
+
+Pendant = tuple[Chain, tuple[Reals, Reals], Reals, Flags]
 
 
 class ParallelConstants(NamedTuple):
@@ -159,7 +166,9 @@ def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> Parall
 
 
 @kernel
-def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float) -> tuple[Reals, Flags]:
+def solve_parallel_blocks(
+    k: ParallelConstants, T: Reals, slack: float, pendant: Pendant | None, q: Reals, marked: Flags
+) -> None:
     """Solve poses in closed form, block by block [1]_. Kernel.
 
     Parameters
@@ -167,60 +176,86 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float) -> tuple
     k : constants of the arm
     T : (N, 4, 4), m
     slack : m, roots that miss by less are taken as met
-
-    Returns
-    -------
-    q : (N, 8, 6), rad, NaN where a slot has no solution
-    marked : (N,), where branches meet, for the careful solver
+    pendant : None to leave the table's angles; else they become the manufacturer's, by the turns within the limits that
+        are nearest to ``q_ref``, and poses that their forward kinematics deny are marked, too. Holds the joints and
+        links of the robot's table, its lower and upper limits (6,), rad, ``q_ref`` (N or 1, 6), rad, and ``inside``
+        (N, 8), filled with whether a slot is solved within them
+    q : (N, 8, 6), filled, rad, NaN where a slot has no solution
+    marked : (N,), filled: where branches meet, for the careful solver
     """
-    q, marked = np.empty((T.shape[0], SLOTS, 6)), np.empty(T.shape[0], np.bool_)
-    pose, side, out = np.empty(_POSE_ROWS * BLOCK), np.empty(12 * BLOCK), np.empty(13 * BLOCK)
-    turn = np.empty(7 * BLOCK)
+    pose, side, out = np.empty(_POSE_ROWS * BLOCK), np.empty(12 * BLOCK), np.empty(PAIR_ROWS * BLOCK)
+    turn, reference, moved = np.empty(7 * BLOCK), np.empty(6 * BLOCK), np.empty((7, SCRATCH))
+    if pendant is not None:
+        fill_start(moved, pendant[0][1][0])
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
-        _into_frame(k, T, start, size, pose)
+        fill_poses(T, start, size, pose)
+        if pendant is not None:
+            fill_reference(pendant[2], start, size, reference)
+        _into_frame(k, pose)
         for shoulder in range(2):
             _first_joint(k, pose, side, 1.0 - 2.0 * shoulder, slack)
             for wrist in range(2):
                 spherical_triangles(k.wrist, side, 5, 1.0 - 2.0 * wrist, turn)
                 _elbows(k, pose, side, turn, slack, out)
                 slot = 4 * shoulder + wrist
+                if pendant is not None:
+                    manufacturers_angles(pendant[0][0], pendant[1], reference, out)
+                    confirm_pair(pendant[0], out, int(1), moved, pose)  # noqa: RUF046, UP018  (see inner_kernel)
+                    for i in range(size):
+                        pendant[3][start + i, slot] = out[WITHIN * BLOCK + i] > 0.0
+                        pendant[3][start + i, slot + 2] = out[(WITHIN + 1) * BLOCK + i] > 0.0
                 for i in range(size):
                     for j in range(6):
                         q[start + i, slot, j] = out[j * BLOCK + i]
                         q[start + i, slot + 2, j] = out[(6 + j) * BLOCK + i]
         for i in range(size):
-            marked[start + i] = pose[_MARK * BLOCK + i] > 0.0
+            marked[start + i] = pose[MARK * BLOCK + i] > 0.0
+
+
+def parallel_rows(arm: ThreeParallel, T: Reals, slack: float = 0.0) -> tuple[Reals, Flags]:
+    """Rows of poses by :func:`solve_parallel_blocks`, as the table counts its angles.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), m, contiguous
+    slack : m, roots that miss by less are taken as met
+
+    Returns
+    -------
+    q : (N, 8, 6), rad, NaN where a slot has no solution
+    marked : (N,), where branches meet
+    """
+    q, marked = np.empty((len(T), SLOTS, 6)), np.empty(len(T), dtype=bool)
+    solve_parallel_blocks(arm.constants, T, slack, None, q, marked)
     return q, marked
 
 
 @inner_kernel
-def _into_frame(k: ParallelConstants, T: Reals, start: int, size: int, pose: Reals) -> None:
+def _into_frame(k: ParallelConstants, pose: Reals) -> None:
     """W, axis 6 and the vector across it in the arm's frame."""
+    (ox, oy, oz), (a, b, c), (d, e, f), (g, h, w) = k.place, k.wrist_in_tool, k.axis_6_in_tool, k.beside_6_in_tool
     for i in range(BLOCK):
-        n = start + min(i, size - 1)
-        z, x, wrist = (
-            in_frame_of(T[n], k.axis_6_in_tool),
-            in_frame_of(T[n], k.beside_6_in_tool),
-            in_frame_of(T[n], k.wrist_in_tool),
-        )
+        t00, t01, t02, t03, t10, t11, t12, t13, t20, t21, t22, t23 = rows_at(pose, BLOCK, i)
         p = (
-            wrist[0] + T[n, 0, 3] - k.place[0],
-            wrist[1] + T[n, 1, 3] - k.place[1],
-            wrist[2] + T[n, 2, 3] - k.place[2],
+            t00 * a + t01 * b + t02 * c + t03 - ox,
+            t10 * a + t11 * b + t12 * c + t13 - oy,
+            t20 * a + t21 * b + t22 * c + t23 - oz,
         )
+        z = t00 * d + t01 * e + t02 * f, t10 * d + t11 * e + t12 * f, t20 * d + t21 * e + t22 * f
+        x = t00 * g + t01 * h + t02 * w, t10 * g + t11 * h + t12 * w, t20 * g + t21 * h + t22 * w
         for row in range(3):
             pose[(_W + row) * BLOCK + i] = dot(k.turn[row], p)
             pose[(_Z6 + row) * BLOCK + i] = dot(k.turn[row], z)
             pose[(_X6 + row) * BLOCK + i] = dot(k.turn[row], x)
-        pose[_MARK * BLOCK + i] = 0.0
+        pose[MARK * BLOCK + i] = 0.0
 
 
 @inner_kernel
 def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float) -> None:
     """Joint 1 by one root; then W in the plane, axis 6 and the vector across it as seen from link 1, into ``side``."""
     for i in range(BLOCK):
-        x, y, z = pose[i], pose[BLOCK + i], pose[2 * BLOCK + i]
+        x, y, z = pose[_W * BLOCK + i], pose[(_W + 1) * BLOCK + i], pose[(_W + 2) * BLOCK + i]
         across = np.sqrt(x * x + y * y)
         wanted = (k.height - k.cos_lean * z) / k.sin_lean
         gap = across - abs(wanted)
@@ -228,12 +263,12 @@ def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, sl
         root = sign * np.sqrt(max(under, 0.0))
         per = 1.0 / (across * across)
         c, s = (x * wanted - y * root) * per, (y * wanted + x * root) * per
-        pose[_MARK * BLOCK + i] = 1.0 if (abs(gap) < k.near_m) | (across < k.near_m) else pose[_MARK * BLOCK + i]
+        pose[MARK * BLOCK + i] = 1.0 if (abs(gap) < k.near_m) | (across < k.near_m) else pose[MARK * BLOCK + i]
         side[i] = arctan2(s, c)
         side[BLOCK + i] = 1.0 if gap > -slack else 0.0
         for vector in range(3):
-            vx, vy = pose[3 * vector * BLOCK + i], pose[(3 * vector + 1) * BLOCK + i]
-            vz = pose[(3 * vector + 2) * BLOCK + i]
+            vx, vy = pose[(_W + 3 * vector) * BLOCK + i], pose[(_W + 3 * vector + 1) * BLOCK + i]
+            vz = pose[(_W + 3 * vector + 2) * BLOCK + i]
             u, v = c * vx + s * vy, c * vy - s * vx
             side[(2 + 3 * vector) * BLOCK + i] = k.cos_lean * u - k.sin_lean * vz
             side[(3 + 3 * vector) * BLOCK + i] = v
@@ -259,7 +294,7 @@ def _elbows(k: ParallelConstants, pose: Reals, side: Reals, turn: Reals, slack: 
         far, near = (reach * reach - squared), (squared - smallest * smallest)
         mark = mark | (abs(far) < edge) | (abs(near) < edge) | (squared < k.near_m * k.near_m)
         marked = mark & (side[BLOCK + i] > 0.0)
-        pose[_MARK * BLOCK + i] = 1.0 if marked else pose[_MARK * BLOCK + i]
+        pose[MARK * BLOCK + i] = 1.0 if marked else pose[MARK * BLOCK + i]
         valid = valid & (far > least) & (near > least)
         far, near = max(far, 0.0), max(near, 0.0)
         root_far, root_near = np.sqrt(far), np.sqrt(near)
@@ -268,6 +303,7 @@ def _elbows(k: ParallelConstants, pose: Reals, side: Reals, turn: Reals, slack: 
         cos_bend, sin_bend = (near - far) * per, 2.0 * root_far * root_near * per
         along, beside = k.upper_arm + k.forearm * cos_bend, k.forearm * sin_bend
         one = 1.0 if valid else np.nan
+        out[VALID * BLOCK + i] = 1.0 if valid else 0.0
         theta_5 = (phi_5 - k.wrist.zero_2) * one
         theta_5 -= TURN * np.ceil(theta_5 * per_turn - 0.5)
         for elbow in range(2):
