@@ -256,7 +256,7 @@ def write_results(
 
 
 def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
-    """Read a stage's results, or :class:`AbsentResults` if it was not computed.
+    """Read a stage's results as its pages show them, or :class:`AbsentResults` if it was not computed.
 
     Raises
     ------
@@ -271,7 +271,8 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
         absent = AbsentResults(summary)
         origin = adapter(Provenance).validate_python(record["provenance"])
         return Stored(record["robot"], stage.name, origin, absent, rests_on, folder)
-    return replace(read_results(folder, stage.module("model").RESULTS, record), rests_on=rests_on, folder=folder)
+    found = read_results(folder, stage.module("model").RESULTS, record, on_pages=True)
+    return replace(found, rests_on=rests_on, folder=folder)
 
 
 def is_computed(folder: Path) -> bool:
@@ -288,12 +289,15 @@ def is_computed(folder: Path) -> bool:
     return (folder / SUMMARY).is_file()
 
 
-def read_results(folder: Path, kind: type[ResultsT], record: dict[str, Any] | None = None) -> Stored[ResultsT]:
+def read_results(
+    folder: Path, kind: type[ResultsT], record: dict[str, Any] | None = None, *, on_pages: bool = False
+) -> Stored[ResultsT]:
     """Read the results of a stage that was computed.
 
     Parameters
     ----------
     record : the summary as plain data, if it is read already; it is emptied, as with thousands of targets it is large
+    on_pages : whether only those rows are read that pages show
 
     Raises
     ------
@@ -310,7 +314,7 @@ def read_results(folder: Path, kind: type[ResultsT], record: dict[str, Any] | No
         content = read_bytes(file)
         _compare(file, content, sums)
         try:
-            tables[name] = table.read(content)
+            tables[name] = table.read(content, table.on_pages(summary) if on_pages else None)
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ResultError(file, f"damaged ({' '.join(str(error).split())})") from None
     return Stored(*of, provenance, kind(summary=summary, **tables))
