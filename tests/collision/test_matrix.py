@@ -395,7 +395,7 @@ def test_housings_that_turn_in_each_other_are_adjacent(inner, adjacent):
     poses, shapes = frames(robot, np.zeros(6)), []
     centre = poses[4][:3, 3]
     for link, radius in ((4, 0.05), (6, inner)):
-        ball = trimesh.creation.icosphere(4, radius)
+        ball = trimesh.creation.icosphere(3, radius)
         R, place = poses[link - 1][:3, :3], poses[link - 1][:3, 3]
         points = ball.vertices + (centre - place) @ R
         shapes.append(LinkMesh(link, points, np.array(ball.faces[link == 4 :])))

@@ -112,7 +112,7 @@ def some_arm(joints: int, sliding: tuple[int, ...] = ()) -> er3a.Robot:
 @pytest.mark.long
 def test_the_last_offset_and_alpha_are_settled_or_contradicted_like_others(tmp_path):
     right = load_robot("lbr_iiwa_14").without_tool()
-    write_poses(right, tmp_path, count=14)
+    write_poses(right, tmp_path, count=6)
     found = load_references(tmp_path, right)
     names = ["offset7", "alpha7", "direction7"]
     sound = evidence_of(right, found.references, found.documents, only=names)
