@@ -207,6 +207,11 @@ class Stored(ByValue, Generic[ResultsT]):
         return self.results.summary.verdict.status
 
     @property
+    def withheld(self) -> bool:
+        """Whether it says nothing of the robot: see :func:`withheld`."""
+        return withheld(self.status, self.rests_on.get("validation"))
+
+    @property
     def validated(self) -> Path | None:
         """Where validation's results of the robot are, if there are any."""
         folder = self.folder.parent / "validation" if self.folder else None
@@ -390,6 +395,19 @@ def foundation_of(status: Status, parts: Sequence[Mapping[str, Any]]) -> Foundat
     """
     unsettled = bool(parts) and not any(part["settled"] or part["up_to_signs"] for part in parts)
     return "unsettled" if status == "caution" and unsettled else status
+
+
+def withheld(status: str, foundation: str | None) -> bool:
+    """Whether a stage says nothing of a robot, because evidence contradicts the table that it rests on.
+
+    Whatever it computed is of another arm, so it neither passes nor fails: the one place where this is decided.
+
+    Parameters
+    ----------
+    status : of the stage's verdict; one that was not computed says why
+    foundation : what validation found of the table; None where that is not known
+    """
+    return foundation == "fail" and status not in ("not_computed", "not_examined")
 
 
 def read_scope(folder: Path, stage: Stage) -> Summary:

@@ -357,6 +357,7 @@ for (const link of document.querySelectorAll("[data-t]")) {
   });
 }
 addEventListener("resize", refresh);
+addEventListener("click", ({ target }) => target.closest("a[href^='teach.html#']")?.setAttribute("href", `teach.html?eye=${space.azimuth},${space.elevation}${target.closest("a").hash}`), true); // it is seen from the same side there
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
 /** Shows the moment that the query of an address asks for. */

@@ -41,6 +41,7 @@ from er3a.pipeline.results import (
     Stored,
     foundation_of,
     read_status,
+    withheld,
 )
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -204,10 +205,14 @@ class Head:
     unconfirmed: int = 0
 
     @property
+    def table(self) -> str:
+        """What to know first of the table that all rests on; empty where that is nothing."""
+        return self.caveats["validation"].status if self.caveats else ""
+
+    @property
     def no_verdict(self) -> bool:
         """Whether evidence contradicts the table that all rests on, so that nothing is said of the robot."""
-        first = self.caveats.get("validation")
-        return first is not None and first.status == "fail" and self.status != "not_computed"
+        return withheld(self.status, self.table)
 
     @property
     def sign(self) -> str:
@@ -217,20 +222,17 @@ class Head:
             return "no_verdict"
         if self.status != "pass":  # a table about which documents disagree is worse than one of which part is open
             return "conflict" if self.status == "caution" and getattr(self.summary, "conflicts", None) else self.status
-        first = self.caveats.get("validation")
-        if first is not None and first.status == "unsettled":
+        if self.table == "unsettled":
             return "caution"
         return "pass as_meant" if self.finding.params.get("demonstrations") else "pass"
 
     @property
     def foundation(self) -> str:
         """What is known of the table that all rests on, in two words."""
-        first = self.caveats.get("validation")
-        own: str = "pass"
+        found = self.table or "pass"
         if self.stage == "validation":
-            parts = [part.params for part in self.finding.params.get("parts", ())]
-            own = foundation_of(self.status, parts)
-        return tr(FOUNDATION_WORDS.get(first.status if first else own, FOUNDATION_WORDS["pass"]))
+            found = foundation_of(self.status, [part.params for part in self.finding.params.get("parts", ())])
+        return tr(FOUNDATION_WORDS[found])
 
     @property
     def finding(self) -> Any:
@@ -609,8 +611,12 @@ def panel_link(q_deg: Iterable[float], text: str) -> str:
     -------
     html : a link; the values are written with nine digits
     """
-    joints = ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
-    return Markup('<a href="teach.html#q={}">{}</a>').format(joints, text)
+    return Markup('<a href="{}">{}</a>').format(panel_address(q_deg), text)
+
+
+def panel_address(q_deg: Iterable[float]) -> str:
+    """Where the teach panel shows the arm at joint values (n,), deg, or mm of joints that slide."""
+    return "teach.html#q=" + ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
 
 
 def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
