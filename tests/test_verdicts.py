@@ -205,7 +205,7 @@ def test_what_several_stages_do_not_cover_is_one_caution(study, monkeypatch, exp
     monkeypatch.setattr(verdicts, "is_computed", lambda folder: True)
     monkeypatch.setattr(verdicts, "changed_since", lambda *of: ())
     monkeypatch.setattr(verdicts, "read_scope", scope)
-    monkeypatch.setattr(verdicts, "read_foundation", lambda folder: "pass")
+    monkeypatch.setattr(verdicts, "table_below", lambda folder, stage: "pass")
     found = {each.stage: each for each in read_verdicts(study, Path())}
     assert [each.status for each in found.values()] == ["pass", *["caution"] * 4, "pass"]
     first = "collision" if expect else "workspace"

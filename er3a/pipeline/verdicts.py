@@ -23,9 +23,9 @@ from er3a.pipeline.results import (
     Status,
     changed_since,
     is_computed,
-    read_foundation,
     read_scope,
     read_status,
+    table_below,
     withheld,
 )
 from er3a.pipeline.scope import Coverage, Open
@@ -156,15 +156,13 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str, said: dic
         said |= {gap: Open("as_above", (name,)) for gap in gaps} | said
     text = say_all(replace(verdict, missed=missed).findings)
     answer = f"{text.partition('. ')[0].removesuffix('.')}."
-    below = folder.parent / "validation"
-    foundation = read_foundation(below) if stage.rests_on and is_computed(below) else None
     outdated = changed_since(folder, study, robot, name)
     if outdated:
         text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)
     return StageVerdict(
         *(robot, name, verdict.status, verdict.finding.code, text, shown, expected, summary.checked),
         *(tuple(map(missed_text, missed)), tuple(map(assumed_text, summary.assumed)), outdated, again or ""),
-        *(answer, foundation),
+        *(answer, table_below(folder, stage)),
     )
 
 

@@ -9,7 +9,7 @@ import re
 import shlex
 import subprocess
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
@@ -185,8 +185,8 @@ class ShownFigure:
 class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
-    ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
-    to know first.
+    ``summary`` is the stage's, with the finding that the sentence says; ``caveat``: what to know
+    first of the table that it rests on.
     ``checked``: each check, how much it covers, and why not all. ``assumed``: without a document.
     ``condition``: what of the table has to be confirmed, ``unconfirmed`` entries; empty where that is not known.
     """
@@ -197,7 +197,7 @@ class Head:
     text: str
     figures: tuple[ShownFigure, ...]
     provenance: Provenance
-    caveats: Mapping[str, Caveat]
+    caveat: Caveat | None
     summary: Any
     checked: tuple[tuple[str, str, str], ...] = ()
     assumed: tuple[str, ...] = ()
@@ -207,7 +207,7 @@ class Head:
     @property
     def table(self) -> str:
         """What to know first of the table that all rests on; empty where that is nothing."""
-        return self.caveats["validation"].status if self.caveats else ""
+        return self.caveat.status if self.caveat else ""
 
     @property
     def no_verdict(self) -> bool:
@@ -277,7 +277,6 @@ def head_of(stored: Stored[Any]) -> Head:
         )
         for figure in summary.figures
     )
-    caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     found = say(verdict.finding)
     text = joined([found, *listed(verdict.findings[1:])], " ")
     checked = tuple(
@@ -291,7 +290,7 @@ def head_of(stored: Stored[Any]) -> Head:
         text,
         shown,
         stored.provenance,
-        caveats,
+        caveat(stored.table or ""),
         summary,
         checked,
         tuple(map(assumed_text, summary.assumed)),

@@ -34,7 +34,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     there = tr("What the arm can carry at the tray was not examined.")
     payload = joined([payload_text(known, robot), there], " ")
     trays = [each.tray for each in placing.tried] if placing else []
-    settled = stored.rests_on.get("validation") != "unsettled"
+    settled = stored.table != "unsettled"
     answer = _answer(summary, placing, payload_key(known, robot), settled)
     arms = [(robot, results)]
     instead = alternative_table(study, stored.robot, stored.folder) if contradicted else None

@@ -170,7 +170,7 @@ def labelled(
         far, height = outer[outer[:, 0].argmax()]
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([far / 2, below - BELOW * far]), kind, "reach"))
-        over += dimension(far, below, height, kind)
+        over += [*dimension(far, below, height, kind), DrawnLine(outer, "mark")]  # which no row shows: it is within
     return side_view(seen, floor_mm, ratio=WIDE if arms[1:] else 1.2, labels=labels, over=over)
 
 
