@@ -225,7 +225,7 @@ export class Space extends Orbit {
     const apart = (others) => ([u, v]) => seen([u, v]) && others.every(([a, b, w, h]) => Math.abs(u - a) > (width + w) / 2 || Math.abs(v - b) > (height + h) / 2);
     const gap = ([u, v]) => Math.hypot(Math.max(0, Math.abs(u - x) - width / 2), Math.max(0, Math.abs(v - y) - height / 2));
     const clear = places.find(apart(this.taken)); // or else, in a small picture, on a body beside the word's point rather than far from it
-    const free = clear && (this.width > NARROW * this.letters || gap(clear) < 2 * height) ? clear : (places.filter((place) => gap(place) > height).find(apart(this.taken.filter(([, , , , said]) => said))) ?? clear);
+    const free = !needed || this.width > NARROW * this.letters || (clear && gap(clear) < 2 * height) ? clear : (places.filter((place) => gap(place) > height).find(apart(this.taken.filter(([, , , , said]) => said))) ?? clear);
     if (!free && !needed) return;
     const [u, v] = free ?? [x, y];
     this.taken.push([u, v, width, height, text]);

@@ -89,10 +89,9 @@ def _answer(
     paths = sum(each.kind == "path" for each, row in zip(closest, rows) if row in clear)
     caught = len(params.get("demonstrations", ()))
     due = len(rows) + blocked - caught - len(partly)
-    count = len(clear)
-    headline = tr(
-        "{count} of {due} clear: {poses} poses, {paths} paths.", count=count, due=due, poses=count - paths, paths=paths
-    )
+    headline = tr("{count} of {due} poses and paths clear.", count=len(clear), due=due)
+    if due == len(clear) > 0:
+        headline = tr("{poses} poses and {paths} paths clear.", poses=due - paths, paths=paths)
     keys = [
         (with_unit(fixed(each.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=each.name))
         for each in closest
@@ -103,7 +102,7 @@ def _answer(
         keys.append((with_unit(fixed(free, 0), "%"), tr("joint space free")))
     titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
     return Answer(
-        headline if due else tr("Collisions checked."),
+        headline,
         all_caught(caught),
         joined([tr(text, count=count) for text, count in counted if count], " "),
         keys,

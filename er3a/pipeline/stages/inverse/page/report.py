@@ -116,11 +116,12 @@ def _row(target: model.TargetResult) -> ListRow:
     mark: Literal["pass", "caution", "fail"] = "fail"
     if target.outcome == "reached":
         mark = "caution" if _singular(target) else "pass"
-    fix, place = None, near and near.shifted_to_mm  # where the player shows the arm
+    fix = None
     if target.chosen_deg:
         fix = Fix(tr("jog from there in the teach panel."), panel_address(target.chosen_deg), instead=False)
     elif target.advice and mark == "fail":
-        fix = Fix(say(target.advice[-1]), address_of("inverse", target.name, 1.0, target.name) if place else "")
+        seen = address_of("inverse", target.name, 1.0, target.name) if near and near.shifted_to_mm else ""
+        fix = Fix(say(target.advice[-1]), seen)
     return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
 
 

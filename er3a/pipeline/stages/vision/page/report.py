@@ -195,7 +195,7 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     fix = Fix(tr("describe the gripper: {file}", file=scene), "#carried", False) if "gripper" in gaps else None
     shown = [_row(each, grasp_moment(results, each), fix) for each in objects]
     groups = [
-        Group(tr("Can't be grasped"), [row for row in shown if row.mark == "fail"]),
+        Group(joined([tr("Can't be grasped"), all_caught(caught)], ": "), [row for row in shown if row.mark == "fail"]),
         Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
     if found:
@@ -203,7 +203,7 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
         if not shown:
             rows += [ListRow("caution", each.sample, _why_left_out(each), RESIDUALS) for each in found.suspects]
         groups.append(Group(tr("Doubts"), rows))
-    return Answer(headline, "", all_caught(caught), keys, groups, fix)
+    return Answer(headline, "", "", keys, groups, fix)
 
 
 def _row(each: model.ObjectResult, moment: tuple[str, float], fix: Fix | None) -> ListRow:
