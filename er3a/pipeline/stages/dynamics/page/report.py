@@ -72,7 +72,7 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
     figure, ax = bars(names, torques, texts, [JOINTS[each.link - 1] for each in links])
     figure.set_figheight(TALL)
     ax.set_xlabel(axis_label(model.TorqueRows, "torque", held.unit))
-    caption = tr("What each link adds to J{joint}: its mass times its level distance.", joint=held.joint)
+    caption = tr("Link mass × level distance to J{joint}.", joint=held.joint)
     return Picture(figure, caption, caption)
 
 

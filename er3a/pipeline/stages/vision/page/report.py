@@ -194,8 +194,9 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
     fix = Fix(tr("describe the gripper: {file}", file=scene), "#carried", False) if "gripper" in gaps else None
     shown = [_row(each, grasp_moment(results, each), fix) for each in objects]
+    refused = [row for row in shown if row.mark == "fail"]
     groups = [
-        Group(joined([tr("Can't be grasped"), all_caught(caught)], ": "), [row for row in shown if row.mark == "fail"]),
+        Group(all_caught(caught) if caught == len(refused) else tr("Can't be grasped"), refused),
         Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
     if found:
