@@ -190,7 +190,7 @@ class Stored(ByValue, Generic[ResultsT]):
 
     Attributes
     ----------
-    rests_on : what the stages without which they mean little found, as far as those were computed
+    table : what validation found of the table that they rest on; None where that is not known, or they rest on none
     folder : that they were read from
     """
 
@@ -198,13 +198,13 @@ class Stored(ByValue, Generic[ResultsT]):
     stage: str
     provenance: Provenance
     results: ResultsT
-    rests_on: Mapping[str, Foundation] = field(default_factory=dict)
+    table: Foundation | None = None
     folder: Path | None = None
 
     @property
-    def status(self) -> Status:
-        """The verdict's status."""
-        return self.results.summary.verdict.status
+    def withheld(self) -> bool:
+        """Whether it says nothing of the robot: see :func:`withheld`."""
+        return withheld(self.results.summary.verdict.status, self.table)
 
     @property
     def validated(self) -> Path | None:
@@ -264,15 +264,24 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
         naming the file that is missing, damaged or of another format version
     """
     record = _record(folder)
-    rests_on: dict[str, Foundation] = {
-        name: read_foundation(folder.parent / name) for name in stage.rests_on if is_computed(folder.parent / name)
-    }
+    table = table_below(folder, stage)
     if (summary := _absent(record)) is not None:
         absent = AbsentResults(summary)
         origin = adapter(Provenance).validate_python(record["provenance"])
-        return Stored(record["robot"], stage.name, origin, absent, rests_on, folder)
+        return Stored(record["robot"], stage.name, origin, absent, table, folder)
     found = read_results(folder, stage.module("model").RESULTS, record, on_pages=True)
-    return replace(found, rests_on=rests_on, folder=folder)
+    return replace(found, table=table, folder=folder)
+
+
+def table_below(folder: Path, stage: Stage) -> Foundation | None:
+    """What validation found of the table that a stage rests on; None where it rests on none or that is not known.
+
+    Parameters
+    ----------
+    folder : of the stage's results
+    """
+    below = folder.parent / "validation"
+    return read_foundation(below) if stage.rests_on and is_computed(below) else None
 
 
 def is_computed(folder: Path) -> bool:
@@ -394,6 +403,19 @@ def foundation_of(status: Status, parts: Sequence[Mapping[str, Any]]) -> Foundat
     """
     unsettled = bool(parts) and not any(part["settled"] or part["up_to_signs"] for part in parts)
     return "unsettled" if status == "caution" and unsettled else status
+
+
+def withheld(status: str, foundation: str | None) -> bool:
+    """Whether a stage says nothing of a robot, because evidence contradicts the table that it rests on.
+
+    Whatever it computed is of another arm, so it neither passes nor fails: the one place where this is decided.
+
+    Parameters
+    ----------
+    status : of the stage's verdict; one that was not computed says why
+    foundation : what validation found of the table; None where that is not known
+    """
+    return foundation == "fail" and status not in ("not_computed", "not_examined")
 
 
 def read_scope(folder: Path, stage: Stage) -> Summary:

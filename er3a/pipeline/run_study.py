@@ -34,7 +34,7 @@ from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 from er3a.errors import Er3aError, ResultError
 from er3a.files.kept_files import ROOT, half_written
 from er3a.pipeline.check import check_study
-from er3a.pipeline.results import JUNIT, OVERALL, SUMMARY, check_checksum, check_results, checksum_file
+from er3a.pipeline.results import JUNIT, OVERALL, SUMMARY, check_checksum, check_results, checksum_file, withheld
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import write_junit_error
@@ -180,8 +180,8 @@ def _verdict(robot: str, stage: str) -> str:
         status = str(summary["verdict"]["status"])
     except (OSError, ValueError, KeyError):
         return "no result"
-    wrong = STAGES[stage].rests_on and status in ("pass", "caution") and _verdict(robot, "validation") == "fail"
-    return "no verdict" if wrong else status
+    below = _verdict(robot, "validation") if STAGES[stage].rests_on else None
+    return "no verdict" if withheld(status, below) else status
 
 
 _STATE = Path(".snakemake")

@@ -23,9 +23,10 @@ from er3a.pipeline.results import (
     Status,
     changed_since,
     is_computed,
-    read_foundation,
     read_scope,
     read_status,
+    table_below,
+    withheld,
 )
 from er3a.pipeline.scope import Coverage, Open
 from er3a.pipeline.stages.registry import STAGES
@@ -49,7 +50,7 @@ class StageVerdict:
     outdated : files that have changed since, "the study's settings" or "er3a itself": the verdict is none on what they
         are now
     said_by : the robot's stage whose caution names already all that keeps this one from a pass; empty if there is none
-    foundation : what validation found of the table that it rests on; a contradicted one lets nothing pass
+    foundation : what validation found of the table that it rests on; on a contradicted one there is no verdict
     """
 
     robot: str
@@ -69,8 +70,8 @@ class StageVerdict:
 
     @property
     def no_verdict(self) -> bool:
-        """Whether it would let something pass that rests on a contradicted table."""
-        return self.foundation == "fail" and self.status in ("pass", "caution")
+        """Whether it says nothing of the robot, whose table is contradicted."""
+        return withheld(self.status, self.foundation)
 
     @property
     def shown(self) -> str:
@@ -100,7 +101,7 @@ class StageVerdict:
     @property
     def is_skipped(self) -> bool:
         """Whether nothing was judged: not examined yet, no reference, a stage that does not apply to the robot, or one
-        that would pass what rests on a contradicted table."""
+        that rests on a contradicted table."""
         absent = self.status in (NOT_EXAMINED, "no_reference", "not_computed") or self.no_verdict
         return absent and not (self.broken or self.is_otherwise)
 
@@ -155,15 +156,13 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str, said: dic
         said |= {gap: Open("as_above", (name,)) for gap in gaps} | said
     text = say_all(replace(verdict, missed=missed).findings)
     answer = f"{text.partition('. ')[0].removesuffix('.')}."
-    below = folder.parent / "validation"
-    foundation = read_foundation(below) if stage.rests_on and is_computed(below) else None
     outdated = changed_since(folder, study, robot, name)
     if outdated:
         text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)
     return StageVerdict(
         *(robot, name, verdict.status, verdict.finding.code, text, shown, expected, summary.checked),
         *(tuple(map(missed_text, missed)), tuple(map(assumed_text, summary.assumed)), outdated, again or ""),
-        *(answer, foundation),
+        *(answer, table_below(folder, stage)),
     )
 
 

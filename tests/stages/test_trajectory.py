@@ -365,7 +365,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
 def test_the_page_says_first_what_validation_came_to_and_hands_out_no_program_of_a_contradicted_table(
     study, stored, tmp_path, status, told
 ):
-    report(study, replace(stored["er3_600"], rests_on={"validation": status}), tmp_path / "page.html")
+    report(study, replace(stored["er3_600"], table=status), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     body = page[page.index("<body") :]
     first = body[: body.index("<h1>")]
@@ -639,7 +639,7 @@ def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, st
     path is listed with those that may not run, and with its own fault."""
     met = {"line_limits, repaired": Meeting(0.21, "link 4")}
     monkeypatch.setattr("er3a.pipeline.stages.trajectory.page.report.met_in_tray", lambda study, stored: met)
-    report(study, replace(stored["er3_600"], rests_on={"validation": "pass"}), tmp_path / "page.html")
+    report(study, replace(stored["er3_600"], table="pass"), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert page.count('data-t="0.21">meets the tray at 0.21 s: link 4</a>') == 2
     assert "<small>meets the tray at 0.21 s: link 4</small>" not in page

@@ -72,7 +72,7 @@ def test_a_void_has_the_same_bounds_wherever_it_is_and_a_contradicted_table_has_
     (void,) = (each for each in stored.results.summary.enclosed_voids if each.holds_shoulder)
     low, high = (litres_outwards(bound) for bound in (void.volume_m3.lower, -void.volume_m3.upper))
     for status in ("caution", "fail"):
-        report(study, replace(stored, rests_on={"validation": status}), tmp_path / "page.html")
+        report(study, replace(stored, table=status), tmp_path / "page.html")
         page = (tmp_path / "page.html").read_text(encoding="utf-8")
         assert (f"An enclosed void of at least {low:.2f} L" in page) == (status == "caution")
         assert f">{low:.2f} to {-high:.2f}</td>" in page  # the same bounds, outwards, wherever they stand

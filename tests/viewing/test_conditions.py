@@ -249,7 +249,7 @@ def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch, tmp_pa
     study = SimpleNamespace(robot=lambda name: load_robot(name), scene=lambda name, stage: None)
     folder = tmp_path / "trajectory"
     given = {"folder": folder, "robot": "er3a_c60", "stage": "trajectory"}
-    stored = SimpleNamespace(**given, results=replace(results, avoidance=rows), rests_on={"validation": "caution"})
+    stored = SimpleNamespace(**given, results=replace(results, avoidance=rows), withheld=False)
     assert tray.in_tray(study, stored) is None
     monkeypatch.setattr(tray, "is_computed", lambda folder: folder == tmp_path / "workspace")
     monkeypatch.setattr(tray, "read_stage", lambda folder, stage: placed())
@@ -258,7 +258,7 @@ def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch, tmp_pa
     assert marked.keys() == {"into", "beside, repaired"}
     assert 'data-play="into"' in marked["into"]
     assert "meets the tray at 2.75 s: tool point" in marked["into"]
-    contradicted = SimpleNamespace(**vars(stored) | {"rests_on": {"validation": "fail"}})
+    contradicted = SimpleNamespace(**vars(stored) | {"withheld": True})
     assert tray.in_tray(study, contradicted) is None
     elsewhere = moving(TrajectoryResults, PathChecks, "path", paths, {})
     monkeypatch.setattr(tray, "read_stage", lambda folder, stage: elsewhere)

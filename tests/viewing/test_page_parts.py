@@ -83,10 +83,10 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
     ],
 )
 def test_a_stage_has_one_sign_on_all_pages(status, demonstrations, foundation, sign):
-    caveats = {"validation": Caveat(foundation, "read this")} if foundation != "pass" else {}
+    caveat = Caveat(foundation, "read this") if foundation != "pass" else None
     finding = SimpleNamespace(params={"demonstrations": [None] * demonstrations})
     summary = SimpleNamespace(verdict=SimpleNamespace(finding=finding))
-    head = Head("arm", "trajectory", status, "", (), None, caveats, summary)
+    head = Head("arm", "trajectory", status, "", (), None, caveat, summary)
     assert head.sign == sign
 
 

@@ -165,9 +165,9 @@ def _cell(verdict: StageVerdict, heads: Mapping[str, Head], stored: Results) -> 
     stage, head = verdict.stage, heads.get(verdict.stage)
     if head is None or head.status == "not_computed":
         return StageCell(stage, "not_computed", "–", tr("not computed"), head.text if head else "")
-    value, note = glance(stored[stage].results)
     if head.no_verdict:
-        return StageCell(stage, "no_verdict", value, "")
+        return StageCell(stage, "no_verdict", "", "")
+    value, note = glance(stored[stage].results)
     if verdict.said_by:
         note = tr("see {stages}", stages=tr(PAGES[verdict.said_by]))
     return StageCell(stage, head.sign.split()[0], value, note, head.text)

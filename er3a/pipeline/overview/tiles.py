@@ -22,7 +22,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import ListRow, Mark
 
 Results = Mapping[str, Stored[Any]]
-FEW = 3  # rows of a tile: so many are seen whole on the first screen
+FEW = 4  # rows of a tile: so many are seen whole on the first screen
 LETTERS = 0.14  # of the reach, in the small view from above
 
 

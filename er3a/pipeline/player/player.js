@@ -315,10 +315,10 @@ function withCursors(figure) {
   };
 }
 
-/** Scrolls a listing to the row that is shown of it: into the middle, or to its top where it has no room. */
+/** Scrolls a listing to the row that is shown of it: into the middle, or to its top where it has no room; its first row is whole. */
 function listed(row) {
   const box = row.closest(".listing");
-  if (box) box.scrollTop = row.offsetTop - Math.max(0, (box.clientHeight - row.offsetHeight) / 2);
+  box?.scrollTo(0, [...row.closest("table").rows].map(({ offsetTop }) => offsetTop).find((top) => top >= row.offsetTop - Math.max(0, (box.clientHeight - row.offsetHeight) / 2)));
 }
 
 /** Keeps the player in sight below what the reader points at, whose lower edge is at ``edge`` in the window. */
@@ -357,6 +357,7 @@ for (const link of document.querySelectorAll("[data-t]")) {
   });
 }
 addEventListener("resize", refresh);
+addEventListener("click", ({ target }) => target.closest("a[href^='teach.html#']")?.setAttribute("href", `teach.html?eye=${space.azimuth},${space.elevation}${target.closest("a").hash}`), true); // it is seen from the same side there
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
 /** Shows the moment that the query of an address asks for. */

@@ -11,6 +11,7 @@ const STEPS = 65535; // that the box is divided into
 const FLOOR = 14; // lines of the floor, along what is seen
 const NEAR = 0.8; // of the distance that all is seen from: where a tray is
 const SPARSE = 20; // one of so many points of a void keeps words off it
+const AWAY = 0.3; // of its opacity what is reachable keeps before a tray
 const THROUGH = { transparent: true, depthWrite: false, side: three.DoubleSide };
 
 const place = document.getElementById("turning");
@@ -38,13 +39,12 @@ function placeOf({ points, shapes }) {
   return points ? points.reduce((a, b) => (b[2] > a[2] ? b : a)) : add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
 }
 
-/** Turns the picture until what the address names is before the rest: a tray from its side, with the arm in it, first without what is reachable; a void first without what is around. */
+/** Turns the picture until what the address names is before the rest: a tray from its side, with the arm in it. */
 function face() {
   const at = placeOf(chosen());
   const [[x, y], near] = [subtract(at, middle), Boolean(chosen().shapes)];
   const about = Math.hypot(x, y) < 0.1 * size[0]; // axis 1
   Object.assign(space, { azimuth: about ? data.azimuth : Math.atan2(y, x) + (near ? 0.9 : 0.35), elevation: 0.35, distance: (near || about ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
-  for (const each of unlisted.filter((each) => each !== solids[0])) each.check.checked = Boolean(each.shapes) === near;
   refresh();
 }
 
@@ -103,6 +103,7 @@ function draw() {
   const isSeen = (each) => each.check?.checked ?? (each.shapes ? !shown?.points && each === (near ? shown : first) : !near);
   const arm = near && shown.reached.length ? shown.reached : solids[0].poses;
   for (const each of all) for (const part of each.parts) part.visible = isSeen(each);
+  for (const { material } of layers.flatMap(({ parts }) => parts)) material.opacity = (material.userData.opacity ??= material.opacity) * (near ? AWAY : 1);
   for (const each of solids.filter(isSeen)) {
     const hiding = each === solids[0] || each === shown ? new Set() : space.hiding(each.parts, arm);
     space.place(each.parts, each === solids[0] ? arm : each.poses, new Map(), (part) => hiding.has(part));

@@ -115,10 +115,3 @@ export function tableFrames(table, T) {
   });
   return [table.base, ...rows];
 }
-
-/** The least and greatest motion [x, x] (rad or m) of row k within the joints' limits. */
-export function rowRange(table, k) {
-  const shares = table.coupling ? table.coupling[k] : table.lower.map((_, j) => (j === k ? 1 : 0));
-  const ends = shares.map((share, j) => [table.lower[j], table.upper[j]].map((end) => table.direction[k] * share * end));
-  return [Math.min, Math.max].map((of) => ends.reduce((sum, pair) => sum + of(...pair), 0));
-}

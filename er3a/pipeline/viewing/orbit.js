@@ -19,6 +19,8 @@ export class Orbit {
     this.distance = DISTANCE * length;
     this.readColours();
     this.look("overview");
+    const [azimuth, elevation] = (new URLSearchParams(location.search).get("eye") ?? "").split(",").map(Number);
+    if (elevation) Object.assign(this, { azimuth, elevation }); // of the page that one comes from
     this.#listen();
   }
 

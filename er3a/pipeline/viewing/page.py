@@ -9,7 +9,7 @@ import re
 import shlex
 import subprocess
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
@@ -41,6 +41,7 @@ from er3a.pipeline.results import (
     Stored,
     foundation_of,
     read_status,
+    withheld,
 )
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -184,8 +185,8 @@ class ShownFigure:
 class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
-    ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
-    to know first.
+    ``summary`` is the stage's, with the finding that the sentence says; ``caveat``: what to know
+    first of the table that it rests on.
     ``checked``: each check, how much it covers, and why not all. ``assumed``: without a document.
     ``condition``: what of the table has to be confirmed, ``unconfirmed`` entries; empty where that is not known.
     """
@@ -196,7 +197,7 @@ class Head:
     text: str
     figures: tuple[ShownFigure, ...]
     provenance: Provenance
-    caveats: Mapping[str, Caveat]
+    caveat: Caveat | None
     summary: Any
     checked: tuple[tuple[str, str, str], ...] = ()
     assumed: tuple[str, ...] = ()
@@ -204,10 +205,14 @@ class Head:
     unconfirmed: int = 0
 
     @property
+    def table(self) -> str:
+        """What to know first of the table that all rests on; empty where that is nothing."""
+        return self.caveat.status if self.caveat else ""
+
+    @property
     def no_verdict(self) -> bool:
         """Whether evidence contradicts the table that all rests on, so that nothing is said of the robot."""
-        first = self.caveats.get("validation")
-        return first is not None and first.status == "fail" and self.status != "not_computed"
+        return withheld(self.status, self.table)
 
     @property
     def sign(self) -> str:
@@ -217,20 +222,17 @@ class Head:
             return "no_verdict"
         if self.status != "pass":  # a table about which documents disagree is worse than one of which part is open
             return "conflict" if self.status == "caution" and getattr(self.summary, "conflicts", None) else self.status
-        first = self.caveats.get("validation")
-        if first is not None and first.status == "unsettled":
+        if self.table == "unsettled":
             return "caution"
         return "pass as_meant" if self.finding.params.get("demonstrations") else "pass"
 
     @property
     def foundation(self) -> str:
         """What is known of the table that all rests on, in two words."""
-        first = self.caveats.get("validation")
-        own: str = "pass"
+        found = self.table or "pass"
         if self.stage == "validation":
-            parts = [part.params for part in self.finding.params.get("parts", ())]
-            own = foundation_of(self.status, parts)
-        return tr(FOUNDATION_WORDS.get(first.status if first else own, FOUNDATION_WORDS["pass"]))
+            found = foundation_of(self.status, [part.params for part in self.finding.params.get("parts", ())])
+        return tr(FOUNDATION_WORDS[found])
 
     @property
     def finding(self) -> Any:
@@ -275,7 +277,6 @@ def head_of(stored: Stored[Any]) -> Head:
         )
         for figure in summary.figures
     )
-    caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     found = say(verdict.finding)
     text = joined([found, *listed(verdict.findings[1:])], " ")
     checked = tuple(
@@ -289,7 +290,7 @@ def head_of(stored: Stored[Any]) -> Head:
         text,
         shown,
         stored.provenance,
-        caveats,
+        caveat(stored.table or ""),
         summary,
         checked,
         tuple(map(assumed_text, summary.assumed)),
@@ -609,8 +610,12 @@ def panel_link(q_deg: Iterable[float], text: str) -> str:
     -------
     html : a link; the values are written with nine digits
     """
-    joints = ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
-    return Markup('<a href="teach.html#q={}">{}</a>').format(joints, text)
+    return Markup('<a href="{}">{}</a>').format(panel_address(q_deg), text)
+
+
+def panel_address(q_deg: Iterable[float]) -> str:
+    """Where the teach panel shows the arm at joint values (n,), deg, or mm of joints that slide."""
+    return "teach.html#q=" + ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
 
 
 def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:

@@ -19,6 +19,7 @@ const CREASE = 0.7; // rad between two faces: less is drawn as one that is curve
 // Where a word may be, in its widths and heights from its point.
 const PLACES = [0, -0.5, 0.5, -1, 1, -1.5, 1.5, -2, 2, -2.5, 2.5].flatMap((i) => [0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6].map((j) => [i, j]));
 const NEAR = 3.2; // heights: a word that is not needed is no farther from its point
+const NARROW = 30; // letters of the page: a picture of no more is small
 const WIDE = 3; // heights that a step sideways counts for, at most
 const WORD = 0.85; // height of words, in letters of the page
 export const ARM = 0.05; // about half the width of an arm, in parts of its size: words keep off it
@@ -221,11 +222,13 @@ export class Space extends Orbit {
     const far = ([i, j]) => Math.hypot(Math.min(WIDE, width / height) * i, j);
     const places = PLACES.filter((place) => needed || far(place) < NEAR).sort((a, b) => far(a) - far(b)).map(([i, j]) => [x + i * width, y + j * height]);
     const seen = ([u, v]) => Math.min(u, this.width - u) > width / 2 + size && Math.min(v, this.height - v) > height / 2;
-    const apart = ([u, v]) => this.taken.every(([a, b, w, h]) => Math.abs(u - a) > (width + w) / 2 || Math.abs(v - b) > (height + h) / 2);
-    const free = places.find((place) => seen(place) && apart(place));
+    const apart = (others) => ([u, v]) => seen([u, v]) && others.every(([a, b, w, h]) => Math.abs(u - a) > (width + w) / 2 || Math.abs(v - b) > (height + h) / 2);
+    const gap = ([u, v]) => Math.hypot(Math.max(0, Math.abs(u - x) - width / 2), Math.max(0, Math.abs(v - y) - height / 2));
+    const clear = places.find(apart(this.taken)); // or else, in a small picture, on a body beside the word's point rather than far from it
+    const free = !needed || this.width > NARROW * this.letters || (clear && gap(clear) < 2 * height) ? clear : (places.filter((place) => gap(place) > height).find(apart(this.taken.filter(([, , , , said]) => said))) ?? clear);
     if (!free && !needed) return;
     const [u, v] = free ?? [x, y];
-    this.taken.push([u, v, width, height]);
+    this.taken.push([u, v, width, height, text]);
     const edge = [Math.min(u + width / 2, Math.max(u - width / 2, x)), Math.min(v + height / 2, Math.max(v - height / 2, y))];
     if (Math.hypot(edge[0] - x, edge[1] - y) > 0.4 * height) this.#svg("line", { x1: x, y1: y, x2: edge[0], y2: edge[1], stroke: css });
     const bar = { x: u - width / 2, y: v + 0.3 * size, height: 0.6 * size, rx: 0.2 * size };

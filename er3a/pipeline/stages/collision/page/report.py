@@ -16,12 +16,11 @@ from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import Fault, at_rest, fix_of
 from er3a.pipeline.player.player import drawing_head, player
-from er3a.pipeline.results import Stored, is_computed, read_stage
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
-from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.trajectory.model import TrajectoryResults
 from er3a.pipeline.stages.trajectory.page.played import faults
+from er3a.pipeline.stages.workspace.page.tray import found_by
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, all_caught
 from er3a.pipeline.viewing.page import render_stage
@@ -39,9 +38,10 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
     # A path of which a part can't be reached is clear of nothing.
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
-    judged = _judged(stored.folder)
-    known = {fault.name: fault for fault in faults(judged)} if judged else {}
-    ends = {path.name: path.clear_until for path in judged.summary.paths if path.clear_until} if judged else {}
+    judged = found_by(stored, "trajectory")
+    known = {fault.name: fault for fault in faults(judged.results)} if judged else {}
+    paths = judged.results.summary.paths if judged else ()
+    ends = {path.name: path.clear_until for path in paths if path.clear_until}
     answer = _answer(summary, closest, unreached, known)
     render_stage(
         study,
@@ -83,39 +83,32 @@ def _answer(
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
     counted = (
-        (N_("{count} can't be reached whole."), len(partly)),
+        (N_("{count} paths can't be reached whole."), len(partly)),
         (N_("{count} targets collide in every solution."), blocked := len(params.get("blocked", ()))),
     )
+    paths = sum(each.kind == "path" for each, row in zip(closest, rows) if row in clear)
     caught = len(params.get("demonstrations", ()))
     due = len(rows) + blocked - caught - len(partly)
-    least = next((each for each in closest if each.clearance_mm >= 0), None)
-    keys = (
-        [(with_unit(fixed(least.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=least.name))]
-        if least
-        else []
-    )
+    headline = tr("{count} of {due} poses and paths clear.", count=len(clear), due=due)
+    if due == len(clear) > 0:
+        headline = tr("{poses} poses and {paths} paths clear.", poses=due - paths, paths=paths)
+    keys = [
+        (with_unit(fixed(each.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=each.name))
+        for each in closest
+        if each.clearance_mm >= 0
+    ][:1]
     free = next((each.value for each in summary.figures if each.name == "free_of_collisions"), None)
     if free is not None:
         keys.append((with_unit(fixed(free, 0), "%"), tr("joint space free")))
     titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
     return Answer(
-        tr("{count} of {due} poses and paths clear.", count=len(clear), due=due) if due else tr("Collisions checked."),
+        headline,
         all_caught(caught),
         joined([tr(text, count=count) for text, count in counted if count], " "),
         keys,
         [Group(title, own[:MAX_ROWS]) for title, own in titled],
         next((row.fix for row in hit if row.fix), None),
     )
-
-
-def _judged(folder: Path | None) -> TrajectoryResults | None:
-    """What the stage of paths found, None where it was not computed; ``folder``: of the stage's results, in that of
-    the robot's."""
-    paths = folder.parent / "trajectory" if folder else None
-    if paths is None or not is_computed(paths):
-        return None
-    found: TrajectoryResults = read_stage(paths, STAGES["trajectory"]).results
-    return found
 
 
 def _row(

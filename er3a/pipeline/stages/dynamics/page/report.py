@@ -72,7 +72,7 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
     figure, ax = bars(names, torques, texts, [JOINTS[each.link - 1] for each in links])
     figure.set_figheight(TALL)
     ax.set_xlabel(axis_label(model.TorqueRows, "torque", held.unit))
-    caption = tr("What each link adds to J{joint}: its mass times its level distance.", joint=held.joint)
+    caption = tr("Link mass × level distance to J{joint}.", joint=held.joint)
     return Picture(figure, caption, caption)
 
 
@@ -163,18 +163,12 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         headline = tr("Too much for {joints}.", joints=joined(over, ", "))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
-    rows = []
+    rows, still = [], []
     for motor in order:
         path, t, off = _moment_of(results, motor)
         rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {path}", (path, t), longest, motor.peak_limit))
-    still = [
-        _row(
-            motor, (motor.holding, held.tolerance), holding_name(motor.joint), (holding_name(motor.joint), 0.0), longest
-        )
-        for motor in order
-        for held in summary.holding
-        if held.joint == motor.joint
-    ]
+        name, held = holding_name(motor.joint), summary.holding[motor.joint - 1]
+        still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), longest))
     left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
     todo = tr("enter the motors' peak torques in {file}.", file=file)
     return Answer(

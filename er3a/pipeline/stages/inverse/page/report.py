@@ -30,7 +30,7 @@ from er3a.pipeline.stages.inverse.page.played import (
 from er3a.pipeline.stages.trajectory.page.report import both_arms
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
-from er3a.pipeline.viewing.page import panel_link, render_stage
+from er3a.pipeline.viewing.page import panel_address, panel_link, render_stage
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -108,7 +108,7 @@ def _singular(target: model.TargetResult) -> bool:
 
 
 def _row(target: model.TargetResult) -> ListRow:
-    """A target: how clear the chosen solution is, or what it came to."""
+    """A target: how clear the chosen solution is, or what it came to, and what to do."""
     near = target.neighbours
     note = short_of(near.least_shift_mm) if near and near.least_shift_mm else outcome_word(target.outcome)
     if target.clearance:
@@ -116,9 +116,12 @@ def _row(target: model.TargetResult) -> ListRow:
     mark: Literal["pass", "caution", "fail"] = "fail"
     if target.outcome == "reached":
         mark = "caution" if _singular(target) else "pass"
-    advice = listed(target.advice) if mark == "fail" else ()
-    shown = target.neighbours and target.neighbours.shifted_to_mm  # the player shows the arm there
-    fix = Fix(advice[-1], address_of("inverse", target.name, 1.0, target.name) if shown else "") if advice else None
+    fix = None
+    if target.chosen_deg:
+        fix = Fix(tr("jog from there in the teach panel."), panel_address(target.chosen_deg), instead=False)
+    elif target.advice and mark == "fail":
+        seen = address_of("inverse", target.name, 1.0, target.name) if near and near.shifted_to_mm else ""
+        fix = Fix(say(target.advice[-1]), seen)
     return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
 
 

@@ -55,7 +55,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         programs_answer(robot, results),
         sections=sections,
-        entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
+        entered=None if stored.withheld else in_tray(study, stored),
         compared_with_tray=compared_with_tray,
         faults={fault.name: fault for fault in wrong},
         player=player(robot, played, scene, opened=opened(wrong)),

@@ -203,8 +203,7 @@ def _to_do(
         return text, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe":
         near = near_assumed(path, summary)
-        pair, mm = (say(near.pair), near.margin_mm) if near else ("", 0.0)
-        measure = tr("Measure {pair}: assumed shapes may be off by {mm:g} mm.", pair=pair, mm=mm) if near else ""
+        measure = tr("Measure {pair}.", pair=say(near.pair)) if near else ""
         return joined([*remedies(path.of_program), measure], " "), None
     last = path.sound_end
     if last is None:

@@ -61,7 +61,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     scene = study.scene(stored.robot, stored.stage)
     sections = []
     count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
-    paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
+    paths, contradicted = worst_first(summary.paths), stored.withheld
     lines = program_head(stored.validated, summary.checked, summary.assumed)
     met = None if contradicted else met_in_tray(study, stored)
     wrong = {} if contradicted else _by_name(results)
@@ -247,7 +247,7 @@ def both_arms(
     for other arms."""
     instead, found = alternative_table(study, stored.robot, stored.folder), found_by(stored, "validation")
     arms = [study.robot(name) for name in (stored.robot, instead) if name]
-    if stored.rests_on.get("validation") != "fail" or not found or len({arm.joints for arm in arms}) != len(arms[1:]):
+    if not stored.withheld or not found or len({arm.joints for arm in arms}) != len(arms[1:]):
         return None
     seen, rows = [], []
     for motion in played:

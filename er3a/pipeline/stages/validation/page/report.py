@@ -33,7 +33,6 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     other_robot,
     plain_table,
     poses_to_read,
-    to_confirm,
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix
@@ -187,7 +186,8 @@ def _both_arms(
     for entry, cell in cells.items():
         column, kind, gives = column_of(entry), _kind(cell["status"]), cell["gives"]
         if column == "direction" and kind == "open":
-            over.append(_turn_arrow(robot, q, entry, lines[entry][0], radius))
+            turn = _turn_arrow(robot, q, entry, lines[entry][0], radius)
+            over.append(replace(turn, points=_headed(turn.points[::-1], radius)) if cell["status"] == "open" else turn)
             continue
         angle = column in ANGLES
         if not disputed and cell["status"] == "open" if angle else column in "ad" and f"#cell-{entry}" in worst:
@@ -301,9 +301,8 @@ def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[
     if status == "no_reference":
         return tr("Nothing to check against."), tr("Find documents or measure.")
     if unsure and summary.evidence:
-        count = len(to_confirm(summary.evidence))
         geometry = (part for part in summary.evidence.parts if part.part == "geometry")  # as the index decides
         known = [part.settled or part.up_to_signs for part in geometry]
         first = tr("Good for planning.") if any(known) else tr("Not settled.")
-        return first, tr("Points to confirm before the arm moves: {count}.", count=count)
+        return first, tr("Confirm {count} entries before the arm moves.", count=unsure)
     return tr("This D-H table is right."), tr("Documents settle every entry.")

@@ -25,6 +25,7 @@ from er3a.robots.robot import Robot
 
 WAYS = {"move": N_("move to the approach"), "approach": N_("straight to the grasp"), "retreat": N_("retreat")}
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
+ROUND_M = {"radius": 0.02, "length": 0.06}
 SIGHT = 0.2  # of the farthest distance, how far the drawn pyramid reaches: a longer one would outweigh the arm
 CAMERA_M = (0.09, 0.07, 0.07)
 SIDES = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]  # of a pyramid, its top first
@@ -76,14 +77,16 @@ def placed(pose: PoseEstimate | ObjectResult) -> Reals:
 
 
 def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[Shape]:
-    """The camera with the cone of what it sees, and a box at each object; a camera on the arm moves with it.
+    """The camera with the cone of what it sees, and a box at each object, or a cylinder where it looks the same at any
+    angle; a camera on the arm moves with it.
 
     Returns
     -------
     shapes : of ``viewing/drawn.py``
     """
     found = summary.calibration
-    shapes = [_object(each) for each in summary.objects]
+    kinds = {each.name: "box" if each.symmetry_turns else "cylinder" for each in task.objects}
+    shapes = [_object(each, kinds[each.name]) for each in summary.objects]
     if found is None:
         return shapes
     fixed_camera = found.setup == "eye_to_hand"
@@ -115,6 +118,6 @@ def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _object(each: ObjectResult) -> Shape:
+def _object(each: ObjectResult, kind: str) -> Shape:
     colour, T = VERDICTS["pass" if each.grasp else "fail"], placed(each).tolist()
-    return {"frame": 0, "name": each.name, "kind": "box", "T": T, "size": OBJECT_M, "colour": colour}
+    return {"frame": 0, "name": each.name, "kind": kind, "T": T, "colour": colour, "size": OBJECT_M, **ROUND_M}

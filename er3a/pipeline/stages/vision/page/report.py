@@ -23,7 +23,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
@@ -149,7 +149,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         found=found,
         file=file,
         left_out=[f"{each.sample}{tr(': ')}{_why_left_out(each)}" for each in found.suspects] if found else [],
-        poses=_poses(found) if found else [],
+        poses=[*zip(pose_words(found.setup), map(_pose_rows, (found.hand_eye, found.board)))] if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
@@ -169,12 +169,12 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
 
 def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) -> Answer:
     """How many objects can be grasped, what that leaves open, and how well the camera's place is known."""
-    summary = results.summary
-    grasped = [each for each in summary.objects if each.grasp]
-    caught = all(each.grasp or each.outcome == each.expect for each in summary.objects)
+    summary, objects = results.summary, results.summary.objects
+    grasped = [each for each in objects if each.grasp]
+    caught = sum(not each.grasp and each.outcome == each.expect for each in objects)
     found = summary.calibration
-    headline = tr("{count} of {all} objects can be grasped.", count=len(grasped), all=len(summary.objects))
-    if not summary.objects:
+    headline = tr("{count} of {all} objects can be grasped.", count=len(grasped), all=len(objects) - caught)
+    if not objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
     keys, limit = [], min(task.gripper.tolerance_mm)
     sure = [(each.grasp.probability, each.error_mm, each.name) for each in grasped if each.grasp and each.error_mm]
@@ -193,12 +193,10 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
         keys = [(with_unit(place, "mm"), tr("camera's place, 95 %"))]
     gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
     fix = Fix(tr("describe the gripper: {file}", file=scene), "#carried", False) if "gripper" in gaps else None
-    shown = [_row(each, grasp_moment(results, each), fix) for each in summary.objects]
+    shown = [_row(each, grasp_moment(results, each), fix) for each in objects]
+    refused = [row for row in shown if row.mark == "fail"]
     groups = [
-        Group(
-            tr("Can't be grasped, as expected") if caught else tr("Can't be grasped"),
-            [row for row in shown if row.mark == "fail"],
-        ),
+        Group(all_caught(caught) if caught == len(refused) else tr("Can't be grasped"), refused),
         Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
     if found:
@@ -233,11 +231,6 @@ def _image_folder(study: Study, name: str) -> Path:
 
 def _listed(values: Iterable[float], digits: int = 1) -> str:
     return ", ".join(fixed(value, digits) for value in values)
-
-
-def _poses(found: model.CalibrationResult) -> list[tuple[str, list[list[str]]]]:
-    """Title and rows of both poses with intervals."""
-    return [*zip(pose_words(found.setup), map(_pose_rows, (found.hand_eye, found.board)))]
 
 
 def _pose_rows(pose: model.PoseEstimate) -> list[list[str]]:

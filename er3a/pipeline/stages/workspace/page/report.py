@@ -28,14 +28,14 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     """Render the workspace page of a robot from its results."""
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "capability")
-    contradicted = stored.rests_on.get("validation") == "fail"
+    contradicted = stored.withheld
     placing, masses = placing_of(study, stored), found_by(stored, "dynamics")
     known = masses.results.summary if masses else None
     there = tr("What the arm can carry at the tray was not examined.")
     payload = joined([payload_text(known, robot), there], " ")
     trays = [each.tray for each in placing.tried] if placing else []
-    settled = stored.rests_on.get("validation") != "unsettled"
-    answer = _answer(summary, placing, [] if known else [payload_key(known, robot)], settled)
+    settled = stored.table != "unsettled"
+    answer = _answer(summary, placing, payload_key(known, robot), settled)
     arms = [(robot, results)]
     instead = alternative_table(study, stored.robot, stored.folder) if contradicted else None
     if instead and (right := found_by(stored, "workspace", f"../{instead}")):
@@ -68,20 +68,19 @@ def _labelled(
 
 
 def _answer(
-    summary: model.WorkspaceSummary, placing: Placing | None, payload: Sequence[tuple[str, str]], settled: bool
+    summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str], settled: bool
 ) -> Answer:
-    """How far the arm reaches, its voids, where the tray goes, and the ``payload`` where no other page says it;
+    """How far the arm reaches, its voids, where the tray goes, and the ``payload``;
     ``settled``: whether documents settle anything of the table, or else no place of the tray passes."""
     # The void that the picture shows comes first.
     in_order = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     volume, voids = summary.volume_m3, [_void_as_row(*each) for each in in_order]
     rest, fix, rows = "", None, _tray_as_rows(placing, settled)
-    if summary.voids:
-        rest = tr("Voids: {count}.", count=len(summary.voids))
+    counted = tr("Voids: {count}.", count=len(voids)) if voids else ""
     if placing and rows[0].mark == "pass":
         tray = placing.tray
         centre = millimetres(tray.place.centre_m)
-        rest = joined([rest, whole_sentence(tr("{tray} fits", tray=tray.name))], " ")
+        rest = whole_sentence(tr("{tray} fits", tray=tray.name))
         fix = Fix(tr("add the tray and its stand to the scene at {centre} mm.", centre=centre), "#tray-1", False)
     keys = [
         *(_key_of(void, row.name) for (_, void), row in zip(in_order[:1], voids)),
@@ -89,10 +88,11 @@ def _answer(
             with_unit(fixed(volume.middle, 2), "m³"),
             tr("± {half} m³, proven", half=fixed(volume.upper - volume.middle, 2)),
         ),
-        *payload,
+        payload,
     ]
     groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
-    return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups, fix)
+    below = joined([counted, tr("Distances are from axis 1.")], " ")
+    return Answer(whole_sentence(reaches(summary)), rest, below, keys, groups, fix)
 
 
 def _key_of(void: model.VoidSummary, name: str) -> tuple[str, str]:

@@ -364,7 +364,7 @@ def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
 
     None if that is nowhere, or evidence contradicts the table that all rests on.
     """
-    if stored.rests_on.get("validation") == "fail":
+    if stored.withheld:
         return None
     names = ("workspace", "inverse", *MOTIONS)
     found = {name: each for name in names if (each := found_by(stored, name))}

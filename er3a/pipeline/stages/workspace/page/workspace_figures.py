@@ -150,7 +150,7 @@ def labelled(
     ----------
     arms : what is proven of each
     floor_mm : height of the floor in the base's frame; None where there is none
-    contradicted : whether the table of the last arm is: that arm is red, and without its voids
+    contradicted : whether the table of the last arm is: that arm is red, and no void has a name
 
     Returns
     -------
@@ -165,12 +165,12 @@ def labelled(
         lines = border_lines(border.arc, border.rho_m, border.z_m)
         seen.append(SeenArm(own_title(robot.title), "", kind, arm, lines))
         outer = np.concatenate(lines)
-        if kind == "right":
+        if not contradicted:
             labels += void_labels(summary)
         far, height = outer[outer[:, 0].argmax()]
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([far / 2, below - BELOW * far]), kind, "reach"))
-        over += dimension(far, below, height, kind)
+        over += [*dimension(far, below, height, kind), DrawnLine(outer, "mark")]  # which no row shows: it is within
     return side_view(seen, floor_mm, ratio=WIDE if arms[1:] else 1.2, labels=labels, over=over)
 
 
