@@ -32,6 +32,7 @@ TRIED, KEPT = 3_000, 200
 MIDDLE = 0.1  # share of each range that is left out at either end
 FROM_SINGULAR = 0.3  # of the best smallest singular value among all tried
 CLEAR_M, FLOOR_M = 0.03, 0.05  # of the arm from itself, and of its joints and tool from the floor below the base
+NARROW = 0.5  # of the widest gap of an arm that is built closer to itself than CLEAR_M
 DIGIT_M, DIGIT_DEG = 1e-5, 0.01
 
 
@@ -88,7 +89,10 @@ def _safe(robot: Robot, q: Reals) -> tuple[Reals, bool]:
     heights = np.concatenate([frames(robot, q)[:, 1:, 2, 3], forward(robot, q)[:, None, 2, 3]], axis=1)
     q = q[(size > FROM_SINGULAR * size.max(initial=0.0)) & (heights.min(axis=1) > FLOOR_M)]
     shapes = bool(robot.envelopes or robot.hulls or robot.meshes)
-    return (q[clearance(robot, q, None).distance > CLEAR_M] if shapes and len(q) else q), shapes
+    if shapes and len(q):
+        gap = clearance(robot, q, None).distance
+        q = q[gap > min(CLEAR_M, NARROW * gap.max())]
+    return q, shapes
 
 
 def _effects(robot: Robot, q: Reals) -> Reals:

@@ -104,15 +104,14 @@ def read_arm(
         return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
     if path.suffix in URDF:
         from er3a.formats.urdf import import_urdf, urdf_table  # half of what reading an arm needs
-        from er3a.formats.urdf_tree import plain_urdf, srdf_home, tip_after
+        from er3a.formats.urdf_tree import plain_urdf, tip_after
 
         with plain_urdf(path, xacro) as plain:
             if tip is None and joints is not None:
                 tip = tip_after(plain, base, joints)
             if whole:
-                imported = import_urdf(plain, base=base, tip=tip)
-                home = None if srdf is None else srdf_home(srdf, imported.robot, imported.joints)
-                return ReadArm(imported.robot.replace(home=home), False, imported.notes)
+                imported = import_urdf(plain, base=base, tip=tip, srdf=srdf)
+                return ReadArm(imported.robot, False, imported.notes)
             robot, assumed, beside = urdf_table(plain, base=base, tip=tip)
         units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
         return ReadArm(robot, False, assumed, beside, units)

@@ -80,6 +80,7 @@ def import_urdf(
     tip: str | None = None,
     snap: bool = True,
     xacro: Sequence[str] = (),
+    srdf: str | Path | None = None,
 ) -> UrdfImport:
     """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
     Links none of whose collision shapes can be read are checked as they look, and so are those that look larger than
@@ -99,6 +100,7 @@ def import_urdf(
     snap : take angles that the file shows rounded (1.571, 0.785) as the multiples of 45 deg that they stand for; one
         note says how many, and by how much that moves the flange
     xacro : arguments of a xacro file, ``NAME:=VALUE``
+    srdf : from which home is taken, see :func:`er3a.formats.urdf_tree.srdf_home`; a note says if it gives none
 
     Raises
     ------
@@ -106,7 +108,12 @@ def import_urdf(
         if the file is not a URDF, has several arms (candidates are named), or no arm of 1 to 10 joints
     """
     with urdf_tree.plain_urdf(Path(path), xacro) as plain:
-        return _imported(plain, base, tip, snap)
+        found = _imported(plain, base, tip, snap)
+    if srdf is None:
+        return found
+    home = urdf_tree.srdf_home(Path(srdf), found.robot, found.joints)
+    lacking = () if home is not None else (f"{Path(srdf).name} has no regular state of all joints: home is chosen",)
+    return replace(found, robot=found.robot.replace(home=home), notes=(*found.notes, *lacking))
 
 
 def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> UrdfImport:

@@ -8,7 +8,7 @@ are in metres and angles in radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -17,12 +17,22 @@ import numpy as np
 from er3a.errors import InputError
 from er3a.finding import Finding, fact
 from er3a.formats.mesh_file import read_link_mesh, read_text
-from er3a.formats.urdf_tree import FAR_APART_M, MAX_BYTES, MOVING, WHOLE_TURN, body_of, mesh_of, number_of, numbers_of
+from er3a.formats.urdf_tree import (
+    FAR_APART_M,
+    MAX_BYTES,
+    MOVING,
+    WHOLE_TURN,
+    body_of,
+    mesh_of,
+    number_of,
+    numbers_of,
+    plain_urdf,
+)
 from er3a.programs.instructions import Place
 from er3a.robots.masses import no_body
 from er3a.xml_lines import LINE, read_xml
 
-WRONG = ("urdf_lengths", "urdf_angles", "urdf_limits_reversed", "urdf_inertia")
+WRONG = ("urdf_lengths", "urdf_angles", "urdf_limits_reversed", "urdf_inertia", "urdf_mesh_unusable")
 """Rules of numbers that can't be meant; the others name what is missing or no data."""
 MANY_TURNS = 10 * 2 * math.pi
 NONE = (0.0, 0.0, 0.0)
@@ -33,32 +43,34 @@ Broken = tuple[str, Element, str]
 """A rule, the element that breaks it, and its name or value."""
 
 
-def lint(path: Path) -> tuple[tuple[Finding, Place], ...]:
+def lint(path: Path, xacro: Sequence[str] = ()) -> tuple[tuple[Finding, Place], ...]:
     """The rules that a URDF breaks.
 
     Parameters
     ----------
-    path : of a URDF that can be read; of xacro, which has to be expanded before, nothing is said
+    path : of a URDF that can be read, or of xacro, of which the expanded URDF is looked at
+    xacro : arguments of a xacro file, ``NAME:=VALUE``
 
     Returns
     -------
     found : one finding for each rule, ``names`` being the elements (at most as many as are printed), and the line of
-        the first
+        the first; line 1 of xacro, in which no element of the expanded URDF has a line
 
     Raises
     ------
     InputError
         for what is no XML
     """
-    text = read_text(path, MAX_BYTES)
-    if "<xacro:" in text or "$(" in text:
-        return ()
-    root = read_xml(text, path)
     broken: dict[str, list[tuple[Element, str]]] = {}
-    for code, element, name in (*_of_joints(path, root), *_of_links(path, root)):
-        broken.setdefault(code, []).append((element, name))
+    with plain_urdf(path, xacro) as plain:
+        root = read_xml(read_text(plain, MAX_BYTES), plain)
+        for code, element, name in (*_of_joints(plain, root), *_of_links(plain, root)):
+            broken.setdefault(code, []).append((element, name))
     return tuple(
-        (fact(code, names=tuple(dict.fromkeys(name for _, name in where))), Place(path, int(where[0][0].attrib[LINE])))
+        (
+            fact(code, names=tuple(dict.fromkeys(name for _, name in where))),
+            Place(path, int(where[0][0].attrib[LINE]) if plain == path else 1),
+        )
         for code, where in broken.items()
     )
 

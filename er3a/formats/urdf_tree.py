@@ -446,12 +446,12 @@ def srdf_home(path: Path, robot: Robot, joints: Sequence[str]) -> Reals | None:
 
     Returns
     -------
-    q : (n,), rad or m; None where only near-singular states are given
+    q : (n,), rad or m; None where no state gives all joints, or only near-singular ones do
 
     Raises
     ------
     InputError
-        for a file that is none, and one in which no state gives all joints
+        for a file that is none
     """
     states: dict[str, Reals] = {}
     with plain_urdf(path) as plain:
@@ -461,8 +461,6 @@ def srdf_home(path: Path, robot: Robot, joints: Sequence[str]) -> Reals | None:
         if values.keys() >= set(joints):
             given = [numbers_of(path, f"group_state {name}", values[joint], "value", None)[0] for joint in joints]
             states[name] = np.array(given)
-    if not states:
-        raise InputError(path, "group_state", f"none gives {_some(list(joints))}", "Write home_deg into the robot file")
     return states.get("home", next((q for q in states.values() if not USUAL_NEAR.contains(robot, q[None])[0]), None))
 
 

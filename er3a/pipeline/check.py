@@ -113,12 +113,13 @@ def _check_vision(path: Path) -> None:
 URDF_FILE = "a URDF"
 
 
-def rules_broken(path: Path, kind: str) -> list[tuple[LocatedFinding, str]]:
+def rules_broken(path: Path, kind: str, xacro: Sequence[str] = ()) -> list[tuple[LocatedFinding, str]]:
     """The rules that a URDF breaks, each with its text.
 
     Parameters
     ----------
     kind : of the file, as :func:`check_file` says it; no others have rules
+    xacro : arguments of a xacro file, ``NAME:=VALUE``
 
     Raises
     ------
@@ -129,7 +130,7 @@ def rules_broken(path: Path, kind: str) -> list[tuple[LocatedFinding, str]]:
         return []
     return [
         (LocatedFinding("fail" if is_wrong(found) else "caution", found, place), rule_text(found))
-        for found, place in lint(path)
+        for found, place in lint(path, xacro)
     ]
 
 
