@@ -203,12 +203,15 @@ def _robot_of_chain(
     sliding = np.array([joint.type == "prismatic" for joint in moving])
     table = table_from_axes(directions, points, T)
     plain = np.array_equal(coupling, np.eye(*coupling.shape))
-    limits, notes, assumed = _limits(sources)
+    limits, said, assumed = _limits(sources)
     speed = np.array([joint.speed for joint in sources])
     unknown = ~((speed > 0) & (speed < FASTEST))
-    notes += [
-        f"joint {sources[k].name} has a speed of {speed[k]:g} {'m/s' if sources[k].type == 'prismatic' else 'rad/s'}, "
-        "which counts as unknown; a URDF's are in radians and metres"
+    said += [
+        (
+            f"has a speed of {speed[k]:g} {'m/s' if sources[k].type == 'prismatic' else 'rad/s'}, which counts as "
+            "unknown; a URDF's are in radians and metres",
+            sources[k].name,
+        )
         for k in np.flatnonzero(unknown & np.isfinite(speed) & (speed != 0))
     ]
     speed[unknown] = math.nan
@@ -237,7 +240,7 @@ def _robot_of_chain(
         continuous=continuous,
         **vars(table),
     )
-    return robot, sources, coupling, shift, [*notes, *more]
+    return robot, sources, coupling, shift, [*urdf_tree.by_note(said), *more]
 
 
 def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlaces:
@@ -428,27 +431,27 @@ def _motion(joint: urdf_tree.UrdfJoint, values: Reals) -> Reals:
     return T
 
 
-def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[str]]:
-    """Limits (n, 2), rad or m, notes, and the joints that the file gives none, none that can be, or some that may be
-    in degrees."""
-    rows, notes, assumed = [], [], []
+def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[tuple[str, str]], list[str]]:
+    """Limits (n, 2), rad or m, notes with their joints, and the joints that the file gives none, none that can be, or
+    some that may be in degrees."""
+    rows, said, assumed = [], [], []
     for joint in sources:
         lower, upper, turns = joint.lower, joint.upper, joint.type == "revolute"
         widest, shown = max(abs(lower), abs(upper)), f"limits of {lower:g} to {upper:g}"
         if joint.type == "continuous":
-            notes.append(f"joint {joint.name} is continuous: one turn is sampled")
+            said.append(("is continuous: one turn is sampled", joint.name))
             lower, upper = -math.pi, math.pi
         elif not widest <= (urdf_tree.MAX_TURNED if turns else MAX_SLID_M):
             none = "no limits" if math.isnan(lower) else f"{shown}, which no joint has"
             half, assumed_as = (NO_RANGE, "180 deg") if turns else (NO_SLIDE_M, f"{NO_SLIDE_M * 1000:g} mm")
-            notes.append(f"joint {joint.name} has {none}: +-{assumed_as} were assumed")
+            said.append((f"has {none}: +-{assumed_as} were assumed", joint.name))
             assumed.append(joint.name)
             lower, upper = -half, half
         elif turns and widest > MANY_TURNS:
-            notes.append(f"joint {joint.name} has {shown} rad, more than two turns; a URDF's are in radians")
+            said.append((f"has {shown} rad, more than two turns; a URDF's are in radians", joint.name))
             assumed.append(joint.name)
         rows.append((lower, upper))
-    return np.array(rows), notes, assumed
+    return np.array(rows), said, assumed
 
 
 def _held_by_followers(

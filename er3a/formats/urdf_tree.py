@@ -310,7 +310,16 @@ def _notes_of(tree: Tree, joints: Sequence[UrdfJoint]) -> Iterator[str]:
     """The notes on joints, one for all joints of which the same is said, and one on those beyond the last."""
     if joints and (moving := tree.onward(link := joints[-1].child)[0]):
         yield f"beyond the arm's last link {link} joints are kept at 0, as of a gripper: {_some(_names(moving))}"
-    said = [(note, joint.name) for joint in joints for note in joint.notes]
+    yield from by_note([(note, joint.name) for joint in joints for note in joint.notes])
+
+
+def by_note(said: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """One note for all joints of which the same is said.
+
+    Parameters
+    ----------
+    said : note and joint
+    """
     for note in dict(said):
         first, *others = [name for each, name in said if each == note]
         yield f"joint {first} {note}" + (f"; likewise {_some(others)}" if others else "")

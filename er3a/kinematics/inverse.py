@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
 from er3a.finding import Finding, fact, is_one
-from er3a.geometry.transforms import typed_pose
+from er3a.geometry.transforms import typed_pose, warn_of_rounding
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
 from er3a.kinematics.by_class import confirms, meets_poses, misses, task_mask
@@ -39,6 +39,7 @@ from er3a.robots.whole_turns import turns_alone
 SAME_JOINTS = 1e-9  # rad: rows so near to each other are one
 SAME_MEMBER = 1e-6  # rad or m: a member of a self-motion so near to a row is listed already
 MISSED = 1e-4  # rad or m from all rows
+FIVE, TYPED = 5, 2e-3  # joints; m and rad, that three decimals in a pose are off by, half of it in its rotation
 SOLVES = 1e-12  # m and parts of 1
 MOST_AT_ONCE = 1024  # turns of a pose; more take the longer way
 STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere
@@ -64,7 +65,8 @@ def inverse(
 
     Parameters
     ----------
-    T : (4, 4), T_base_tool, m; of a rotation with three decimals the nearest is taken, and a warning says how far it is
+    T : (4, 4), T_base_tool, m; of a rotation with three decimals the nearest is taken, and a warning says how far it
+        is; and of five joints then the nearest pose that they can do, up to ``TYPED`` away
     q_ref : (n,), rad or m, reference for the choice of members of self-motions and of whole turns: in each branch the
         nearest turn comes first. None means zeros.
     redundancy : (k,), values of the redundancy parameters (``parameters_of``): an arm angle in rad, or a joint's value;
@@ -83,12 +85,17 @@ def inverse(
     """
     if (at_once := _at_once(robot, T, q_ref)) is not None:
         return at_once
-    T = typed_pose(T)
+    given, T = T, typed_pose(T)
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
     q_ref = checked_reference(robot, q_ref)
     if wrist_partition_missing(robot) or robot.coupling is not None:
         found = _by_class(robot, T, q_ref, redundancy, self_motion_rows)
+        if not len(found.q) and robot.joints == FIVE and (given != T).any():
+            near = missed_row(robot, T, q_ref)  # no typed pose is exactly one of five joints
+            if (off := max(near.position_error, near.rotation_error)) <= TYPED:
+                warn_of_rounding("T, for five joints,", off, "pose")
+                return inverse(robot, forward(robot, near.q), q_ref)
     else:
         found = _by_closed_form(robot, T, q_ref)
     return _at_exit(robot, found, T, q_ref if redundancy is None and not found.regular else None)
