@@ -32,7 +32,6 @@ TRIED, KEPT = 3_000, 200
 MIDDLE = 0.1  # share of each range that is left out at either end
 FROM_SINGULAR = 0.3  # of the best smallest singular value among all tried
 CLEAR_M, FLOOR_M = 0.03, 0.05  # of the arm from itself, and of its joints and tool from the floor below the base
-NARROW = 0.5  # of the widest gap of an arm that is built closer to itself than CLEAR_M
 DIGIT_M, DIGIT_DEG = 1e-5, 0.01
 
 
@@ -86,12 +85,12 @@ def _safe(robot: Robot, q: Reals) -> tuple[Reals, bool]:
     """Poses within limits, away from singular ones, the floor and the arm itself; whether it has shapes."""
     q = q[within(robot, q)]
     size = conditioning(robot, q).smallest_singular_value
-    heights = np.concatenate([frames(robot, q)[:, 1:, 2, 3], forward(robot, q)[:, None, 2, 3]], axis=1)
-    q = q[(size > FROM_SINGULAR * size.max(initial=0.0)) & (heights.min(axis=1) > FLOOR_M)]
+    heights = np.minimum(frames(robot, q)[:, 1:, 2, 3].min(axis=1), forward(robot, q)[:, 2, 3])
+    q = q[(size > FROM_SINGULAR * size.max(initial=0.0)) & (heights > FLOOR_M)]
     shapes = bool(robot.envelopes or robot.hulls or robot.meshes)
     if shapes and len(q):
         gap = clearance(robot, q, None).distance
-        q = q[gap > min(CLEAR_M, NARROW * gap.max())]
+        q = q[gap > min(CLEAR_M, gap.max() / 2)]  # some arms are built closer to themselves than CLEAR_M
     return q, shapes
 
 

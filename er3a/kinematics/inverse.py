@@ -39,7 +39,7 @@ from er3a.robots.whole_turns import turns_alone
 SAME_JOINTS = 1e-9  # rad: rows so near to each other are one
 SAME_MEMBER = 1e-6  # rad or m: a member of a self-motion so near to a row is listed already
 MISSED = 1e-4  # rad or m from all rows
-FIVE, TYPED = 5, 2e-3  # joints; m and rad, that three decimals in a pose are off by, half of it in its rotation
+TYPED = 2e-3  # m and rad, that three decimals in a pose are off by, half of it in its rotation
 SOLVES = 1e-12  # m and parts of 1
 MOST_AT_ONCE = 1024  # turns of a pose; more take the longer way
 STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere
@@ -91,7 +91,7 @@ def inverse(
     q_ref = checked_reference(robot, q_ref)
     if wrist_partition_missing(robot) or robot.coupling is not None:
         found = _by_class(robot, T, q_ref, redundancy, self_motion_rows)
-        if not len(found.q) and robot.joints == FIVE and (given != T).any():
+        if not len(found.q) and robot.joints == 5 and (given != T).any():
             near = missed_row(robot, T, q_ref)  # no typed pose is exactly one of five joints
             if (off := max(near.position_error, near.rotation_error)) <= TYPED:
                 warn_of_rounding("T, for five joints,", off, "pose")
@@ -193,10 +193,7 @@ def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> soluti
         kept = np.isfinite(rows[:, 0])
         if not kept.any():
             position, rotation, _ = misses(robot, T, q)
-            nearest = fact(
-                "nearest_miss", position_mm=float(position.min() * 1000), rotation_deg=float(np.degrees(rotation.min()))
-            )
-            unsolved = (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=nearest)),)
+            unsolved = _no_row(position.min(), rotation.min())
         q, branch = rows[kept], branch[kept]
     if own is not None and within(robot, own) and np.abs(forward(robot, own) - T).max() <= SOLVES:
         away = max_joint_move(q, own)
@@ -276,11 +273,15 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
             rows, branches = _near_solved(robot, T, near.q, q_ref)
             certain = False
         else:
-            position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
-            miss = fact("nearest_miss", position_mm=position * 1000, rotation_deg=float(np.degrees(rotation)))
-            unsolved = (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=miss)),)
+            unsolved = _no_row(near.position_error, near.rotation_error)
     method = fact("by_class", arm_class=solver.code, certain=bool(certain), named=bool(solutions.slot_labels(robot)))
     return _Found(rows, branches, method, unsolved, traced)
+
+
+def _no_row(position: Reals, rotation: Reals) -> tuple[solutions.Unsolved, ...]:
+    """Why a pose has no row: by how much (m, rad) the nearest one misses it."""
+    miss = fact("nearest_miss", position_mm=float(position * 1000), rotation_deg=float(np.degrees(rotation)))
+    return (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=miss)),)
 
 
 def _distance(rows: Reals, q: Reals) -> float:
@@ -419,21 +420,10 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 
 def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.Unsolved, ...]:
     """Why a shoulder side has no branch: by that of its four slots which misses least."""
-    found = []
-    sides = {slot // 4 for slot in np.flatnonzero(fault == REACHED).tolist()}
-    for shoulder in (0, 1):
-        if shoulder in sides:
-            continue
-        part = slice(4 * shoulder, 4 * shoulder + 4)
-        best = 4 * shoulder + int(np.argmin(gap[part]))
-        found.append(
-            fact(
-                "side_unsolved",
-                side=solutions.side_of(robot, best),
-                why=_out_of_reach(robot, int(fault[best]), float(gap[best])),
-            )
-        )
-    return tuple(found)
+    sides = {0, 4} - {4 * (slot // 4) for slot in np.flatnonzero(fault == REACHED).tolist()}
+    best = [side + int(np.argmin(gap[side : side + 4])) for side in sorted(sides)]
+    whys = [_out_of_reach(robot, int(fault[slot]), float(gap[slot])) for slot in best]
+    return tuple(fact("side_unsolved", side=solutions.side_of(robot, slot), why=why) for slot, why in zip(best, whys))
 
 
 def _out_of_reach(robot: Robot, fault: int, gap: float) -> Finding:

@@ -38,7 +38,7 @@ from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import TargetFile, load_targets, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
-from er3a.formats.urdf_lint import is_wrong, lint
+from er3a.formats.urdf_lint import WRONG, lint
 from er3a.pipeline.messages.urdf import rule_text
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
@@ -129,7 +129,7 @@ def rules_broken(path: Path, kind: str, xacro: Sequence[str] = ()) -> list[tuple
     if kind != URDF_FILE:
         return []
     return [
-        (LocatedFinding("fail" if is_wrong(found) else "caution", found, place), rule_text(found))
+        (LocatedFinding("fail" if found.code in WRONG else "caution", found, place), rule_text(found))
         for found, place in lint(path, xacro)
     ]
 

@@ -78,7 +78,6 @@ def check(
             help="robot, study, target, path, scene or reference files (default: the study in this folder)",
         ),
     ] = None,
-    *,
     xacro: options.Xacro = None,
     base: options.Base = None,
     tip: options.Tip = None,
