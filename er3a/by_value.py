@@ -169,12 +169,12 @@ class Sheet:
         heading: str,
         columns: tuple[str, ...],
         rows: Iterable[Sequence[Any]],
-        count: int,
         facts: tuple[str, ...] = (),
     ) -> Sheet:
-        """With the first of ``count`` rows of values."""
-        shown = tuple(tuple(shortly(value) for value in row) for row in islice(rows, MAX_ROWS))
-        return cls(heading, columns, shown, max(count - len(shown), 0), facts)
+        """With the first rows of values."""
+        each = iter(rows)
+        shown = tuple(tuple(map(shortly, row)) for row in islice(each, MAX_ROWS))
+        return cls(heading, columns, shown, sum(1 for _ in each), facts)
 
 
 class Displayed:
@@ -185,8 +185,8 @@ class Displayed:
 
     def sheet(self) -> Sheet:
         """What is shown."""
-        rows = [(part.name, getattr(self, part.name)) for part in fields(self)]  # type: ignore[arg-type]
-        return Sheet.of_table(type(self).__name__, ("field", "value"), rows, len(rows))
+        rows = ((part.name, getattr(self, part.name)) for part in fields(self))  # type: ignore[arg-type]
+        return Sheet.of_table(type(self).__name__, ("field", "value"), rows)
 
     def __repr__(self) -> str:
         return as_text(self.sheet())

@@ -145,8 +145,8 @@ def load_robot(
     InputError
         naming file, field and remedy
     """
-    given: Any = {"convention": convention, "xacro": xacro, "base": base, "tip": tip}
-    return _warned(name_or_path, read_arm(str(name_or_path), whole=True, **given))
+    arm = read_arm(str(name_or_path), convention=convention, xacro=xacro, base=base, tip=tip, whole=True)
+    return _warned(name_or_path, arm)
 
 
 def _warned(source: str | Path, arm: ReadArm) -> Robot:
@@ -226,8 +226,8 @@ def read_table(
     InputError
         naming the row, column or cell that can't be read, or that can be read in two ways, with both
     """
-    units: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
-    return _warned(source, read_arm(str(source), convention=convention, **units))
+    arm = read_arm(str(source), convention=convention, length_unit=length_unit, angle_unit=angle_unit, columns=columns)
+    return _warned(source, arm)
 
 
 def read_robot(path: Path) -> robot_file.RobotFile:

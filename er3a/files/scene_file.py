@@ -206,8 +206,7 @@ def load_scene(path: str | Path) -> library.Scene:
     InputError
         naming file, field and remedy
     """
-    path = Path(path)
-    return load(SceneFile, own_or_shipped(path if path.suffix else f"data/scenes/{path}.yaml")).scene()
+    return load(SceneFile, own_or_shipped(path if Path(path).suffix else f"data/scenes/{path}.yaml")).scene()
 
 
 def _is_pin(xyz_mm: list[float], least: float) -> bool:

@@ -282,7 +282,6 @@ class Solutions(ByValue, Displayed):
             f"Solutions of one pose of {self.robot.name}: {self._counted()} ({self.method.code})",
             ("row", "branch", *joint_columns(self.robot), *("turned_deg" for _ in turned), "within", "reason"),
             rows,
-            len(self.q),
             facts=(
                 *(f"self-motion: {family!r}" for family in self.families),
                 *(f"unsolved: {shortly(why)}" for why in self.unsolved),

@@ -306,7 +306,7 @@ class ReferenceSet(Displayed):
             for own in [[each for each in self.references if each.group == group]]
         )
         heading = f"Reference set {self.name}: {len(self.references)} numbers, {len(self.checkable)} to check against"
-        return Sheet.of_table(heading, ("group", "numbers", "grades"), rows, len(groups))
+        return Sheet.of_table(heading, ("group", "numbers", "grades"), rows)
 
 
 def quantities_of(references: Iterable[Reference]) -> tuple[Quantity, ...]:
