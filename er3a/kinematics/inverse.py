@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +93,7 @@ def inverse(
         found = _by_class(robot, T, q_ref, redundancy, self_motion_rows)
         if not len(found.q) and robot.joints == 5 and (given != T).any():
             near = missed_row(robot, T, q_ref)  # no typed pose is exactly one of five joints
-            if (off := max(near.position_error, near.rotation_error)) <= TYPED:
+            if (off := max(map(float, misses(robot, T, near.q)))) <= TYPED:
                 warn_of_rounding("T, for five joints,", off, "pose")
                 return inverse(robot, forward(robot, near.q), q_ref)
     else:
@@ -278,7 +278,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
     return _Found(rows, branches, method, unsolved, traced)
 
 
-def _no_row(position: Reals, rotation: Reals) -> tuple[solutions.Unsolved, ...]:
+def _no_row(position: Any, rotation: Any) -> tuple[solutions.Unsolved, ...]:
     """Why a pose has no row: by how much (m, rad) the nearest one misses it."""
     miss = fact("nearest_miss", position_mm=float(position * 1000), rotation_deg=float(np.degrees(rotation)))
     return (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=miss)),)
