@@ -64,7 +64,7 @@ class ArmShapes:
     uncovered : of these, those that reach out of the shapes of the links beside them, along the table's lengths; and
         links whose visual meshes reach out of all shapes; each with how far, m, infinite where there are no such shapes
     partial : links with given shapes that reach along less than ``COVERED`` of the link's lengths in the table, and
-        leave more than ``GAP`` of them, each with that share
+        leave more than ``GAP`` of them, each with that share; not a base that is drawn, whose frame may stand anywhere
     """
 
     capsules: tuple[Envelope, ...]
@@ -107,7 +107,8 @@ def arm_shapes(robot: Robot) -> ArmShapes:
     shapes = ArmShapes(capsules, robot.hulls, robot.meshes, given, grade, ())
     bare = tuple(link for link in range(robot.rows + 1) if given and link not in shapes.links)
     shapes = replace(shapes, bare=bare)
-    lengths = ((link, *covered_lengths(robot, shapes, link)) for link in sorted(shapes.links) if given)
+    drawn = {BASE} & {visual.link for visual in robot.visuals}  # its frame may stand far below what is drawn of it
+    lengths = ((link, *covered_lengths(robot, shapes, link)) for link in sorted(shapes.links - drawn) if given)
     beyond = ((link, _uncovered(robot, shapes, link)) for link in range(robot.rows + 1))
     return replace(
         shapes,
