@@ -250,8 +250,8 @@ def read_robot(path: Path) -> robot_file.RobotFile:
     content = load(robot_file.RobotFile, path)
     if content.name != path.stem:
         raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
-    given = content.named_surfaces()
-    return content.with_surfaces(tuple(read_stl(path.parent / each.stl, each.link, each.sha256) for each in given))
+    found = (read_stl(path.parent / each.stl, each.link, each.sha256) for each in content.named_surfaces())
+    return content.with_surfaces(tuple(found))
 
 
 def robot_path(name_or_path: str | Path) -> Path:
@@ -273,16 +273,15 @@ def robot_path(name_or_path: str | Path) -> Path:
     text = str(name_or_path)
     if text.endswith((".yaml", ".yml")) or ("." in text and holds_table(text)):
         return Path(text)
-    path = _named_file(text)
-    if path is None and text in known_arms():
+    if path := _named_file(text):
+        return path
+    if text in known_arms():
         problem = f"'{text}' is a known arm; a study needs its file"
         raise InputError(None, None, problem, f"Write it: er3a arms {text} --output data/robots/{text}.yaml")
-    if path is None:
-        alike = [name for name in known_arms() if text and text.lower() in name]
-        known = ", ".join(alike or names("data/robots", "*.yaml"))
-        remedy = f"Known: {known}; those of er3a arms; or give a path ending in .yaml"
-        raise InputError(None, None, f"there is no robot '{text}'", remedy)
-    return path
+    alike = [name for name in known_arms() if text and text.lower() in name]
+    known = ", ".join(alike or names("data/robots", "*.yaml"))
+    remedy = f"Known: {known}; those of er3a arms; or give a path ending in .yaml"
+    raise InputError(None, None, f"there is no robot '{text}'", remedy)
 
 
 def robot_of(content: robot_file.RobotFile) -> Robot:

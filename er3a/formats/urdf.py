@@ -112,7 +112,7 @@ def import_urdf(
     if srdf is None:
         return found
     home = urdf_tree.srdf_home(Path(srdf), found.robot, found.joints)
-    lacking = () if home is not None else (f"{Path(srdf).name} has no regular state of all joints: home is chosen",)
+    lacking = [f"{Path(srdf).name} has no regular state of all joints: home is chosen"] * (home is None)
     return replace(found, robot=found.robot.replace(home=home), notes=(*found.notes, *lacking))
 
 

@@ -285,8 +285,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
         above = [joints[0].parent, *(joint.child for joint in joints)] if joints else [tip]
         if base is not None and base not in above:
             raise InputError(path, "--base", f"link '{base}' is not above '{tip}'", f"Give one of {_some(above)}")
-        first = above.index(base) if base is not None else 0
-        joints = joints[first:]
+        joints = joints[above.index(base) if base is not None else 0 :]
     else:
         joints = _downwards(tree, base or _root(tree), notes)
     joints = [*back, *joints]

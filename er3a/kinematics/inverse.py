@@ -94,7 +94,7 @@ def inverse(
         if not len(found.q) and robot.joints == 5 and (given != T).any():
             near = missed_row(robot, T, q_ref)  # no typed pose is exactly one of five joints
             if (off := max(map(float, misses(robot, T, near.q)))) <= TYPED:
-                warn_of_rounding("T, for five joints,", off, "pose")
+                warn_of_rounding("T, for five joints,", off)
                 return inverse(robot, forward(robot, near.q), q_ref)
     else:
         found = _by_closed_form(robot, T, q_ref)

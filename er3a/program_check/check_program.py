@@ -195,9 +195,9 @@ class ProgramCheck(ByValue, Displayed):
 
     def sheet(self) -> Sheet:
         """The level, how many motions pass, and a row for each finding."""
-        passed = sum(each.level == "pass" for each in self.verdicts)
+        levels = [each.level for each in self.verdicts]
         return Sheet.of_table(
-            f"{self.execution.program.name}: {self.level}, {passed} of {len(self.verdicts)} motions pass",
+            f"{self.execution.program.name}: {self.level}, {levels.count('pass')} of {len(levels)} motions pass",
             ("line", "level", "finding"),
             ((each.place.line, each.level, each.finding) for each in self.findings),
         )

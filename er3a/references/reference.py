@@ -299,10 +299,9 @@ class ReferenceSet(Displayed):
         -------
         sheet : a row for each group, in alphabetical order
         """
-        groups = sorted({each.group for each in self.references})
         rows = (
             (group, len(own), tuple(sorted({each.grade for each in own})))
-            for group in groups
+            for group in sorted({each.group for each in self.references})
             for own in [[each for each in self.references if each.group == group]]
         )
         heading = f"Reference set {self.name}: {len(self.references)} numbers, {len(self.checkable)} to check against"
