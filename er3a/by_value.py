@@ -17,7 +17,6 @@ short, whatever the size of the object.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
@@ -170,20 +169,24 @@ class Sheet:
         heading: str,
         columns: tuple[str, ...],
         rows: Iterable[Sequence[Any]],
-        count: int,
         facts: tuple[str, ...] = (),
     ) -> Sheet:
-        """With the first of ``count`` rows of values."""
-        shown = tuple(tuple(shortly(value) for value in row) for row in islice(rows, MAX_ROWS))
-        return cls(heading, columns, shown, max(count - len(shown), 0), facts)
+        """With the first rows of values."""
+        each = iter(rows)
+        shown = tuple(tuple(map(shortly, row)) for row in islice(each, MAX_ROWS))
+        return cls(heading, columns, shown, sum(1 for _ in each), facts)
 
 
-class Displayed(ABC):
-    """Anything that shows itself as a sheet, to ``repr`` and ``print`` as well as to a notebook."""
+class Displayed:
+    """Anything that shows itself as a sheet, to ``repr`` and ``print`` as well as to a notebook: a dataclass by its
+    fields, where it has no sheet of its own."""
 
-    @abstractmethod
+    __slots__ = ()
+
     def sheet(self) -> Sheet:
         """What is shown."""
+        rows = ((part.name, getattr(self, part.name)) for part in fields(self))  # type: ignore[arg-type]
+        return Sheet.of_table(type(self).__name__, ("field", "value"), rows)
 
     def __repr__(self) -> str:
         return as_text(self.sheet())

@@ -201,7 +201,7 @@ def test_a_matrix_that_is_no_pose_is_refused(arm, pose, name, kind):
 
 
 def test_a_pose_with_three_decimals_is_taken_and_said_to_be_rounded(arm, pose):
-    with pytest.warns(er3a.InputWarning, match=r"rounded: the nearest rotation is taken, 0\.000\d off"):
+    with pytest.warns(er3a.InputWarning, match=r"rounded: the nearest is taken, 0\.000\d off"):
         found = er3a.inverse(arm, np.round(pose, 3))
     reached = er3a.forward(arm, found.q)
     np.testing.assert_allclose(

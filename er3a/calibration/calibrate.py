@@ -346,7 +346,6 @@ class Calibration(ByValue, Displayed):
             f"Calibration of {self.robot.name} with {self.coordinates} coordinates at {self.poses} poses: {rms}",
             ("entry", "nominal", "correction", "+-95 %", "unit"),
             rows,
-            len(self.estimates),
             (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
         )
 

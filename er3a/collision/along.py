@@ -31,6 +31,7 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
+from er3a.by_value import Displayed
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
@@ -406,8 +407,8 @@ def first_overlap(robot: Robot, scene: Scene, t: Reals, q: Reals) -> tuple[float
     return float(moment), bodies.pairs[int(found[hits[0]].argmax())]
 
 
-@dataclass(frozen=True, eq=False)
-class Clearance:
+@dataclass(frozen=True, eq=False, repr=False)
+class Clearance(Displayed):
     """Smallest distances of arms.
 
     Attributes

@@ -154,8 +154,7 @@ class Scene(ByValue, Displayed):
         sheet : its first rows, and how many are left out
         """
         rows = ((solid.name, type(solid).__name__.lower(), solid.measures) for solid in self.solids)
-        columns = ("name", "solid", "measures")
-        return Sheet.of_table(f"Scene: {shortly(self.title)}", columns, rows, len(self.solids))
+        return Sheet.of_table(f"Scene: {shortly(self.title)}", ("name", "solid", "measures"), rows)
 
 
 def _check(name: str, T: Reals, *sizes: float) -> None:

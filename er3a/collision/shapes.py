@@ -64,7 +64,7 @@ class ArmShapes:
     uncovered : of these, those that reach out of the shapes of the links beside them, along the table's lengths; and
         links whose visual meshes reach out of all shapes; each with how far, m, infinite where there are no such shapes
     partial : links with given shapes that reach along less than ``COVERED`` of the link's lengths in the table, and
-        leave more than ``GAP`` of them, each with that share
+        leave more than ``GAP`` of them, each with that share; not a base that is drawn, whose frame may stand anywhere
     """
 
     capsules: tuple[Envelope, ...]
@@ -107,7 +107,8 @@ def arm_shapes(robot: Robot) -> ArmShapes:
     shapes = ArmShapes(capsules, robot.hulls, robot.meshes, given, grade, ())
     bare = tuple(link for link in range(robot.rows + 1) if given and link not in shapes.links)
     shapes = replace(shapes, bare=bare)
-    lengths = ((link, *covered_lengths(robot, shapes, link)) for link in sorted(shapes.links) if given)
+    drawn = {BASE} & {visual.link for visual in robot.visuals}  # its frame may stand far below what is drawn of it
+    lengths = ((link, *covered_lengths(robot, shapes, link)) for link in sorted(shapes.links - drawn) if given)
     beyond = ((link, _uncovered(robot, shapes, link)) for link in range(robot.rows + 1))
     return replace(
         shapes,
@@ -132,10 +133,8 @@ def covered_lengths(robot: Robot, shapes: ArmShapes, link: int) -> tuple[float, 
     -------
     covered, whole : m
     """
-    lines = _own_lengths(robot, link)
-    lengths = [float(np.linalg.norm(line[1] - line[0])) for line in lines]
-    shares = [_covered(robot, shapes, line, link) for line in lines]
-    return sum(share * length for share, length in zip(shares, lengths)), sum(lengths)
+    found = [_covered(robot, shapes, line, link) for line in _own_lengths(robot, link)]
+    return sum(covered for covered, _ in found), sum(length for _, length in found)
 
 
 def _own_lengths(robot: Robot, link: int) -> list[Reals]:
@@ -149,8 +148,8 @@ def _own_lengths(robot: Robot, link: int) -> list[Reals]:
     return [line for line in lines if not (shifts and abs(line[1, 2] - line[0, 2]) > SHORTEST)]
 
 
-def _covered(robot: Robot, shapes: ArmShapes, line: Reals, link: int) -> float:
-    """The share of one length that is covered, from point to point (2, 3), m, in the link's frame."""
+def _covered(robot: Robot, shapes: ArmShapes, line: Reals, link: int) -> tuple[float, float]:
+    """How much of one length is covered, and the length, m; from point to point (2, 3), m, in the link's frame."""
     length = float(np.linalg.norm(line[1] - line[0]))
     share = (np.arange(LINE_POINTS) + 0.5) / LINE_POINTS
     points, axis = line[0] + share[:, None] * (line[1] - line[0]), (line[1] - line[0]) / length
@@ -158,7 +157,7 @@ def _covered(robot: Robot, shapes: ArmShapes, line: Reals, link: int) -> float:
     for _, corners, radius in _hulls(shapes, {link}):
         along = (corners - line[0]) @ axis
         covered |= (share * length >= along.min() - radius) & (share * length <= along.max() + radius)
-    return float(covered.mean())
+    return float(covered.mean()) * length, length
 
 
 def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> float:

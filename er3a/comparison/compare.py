@@ -18,7 +18,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Displayed
 from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import SIDES, Cause, CauseCode, Explained, explain
@@ -189,8 +189,8 @@ class Alignment(ByValue):
     signs: Reals
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison(ByValue):
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(ByValue, Displayed):
     """What :func:`compare` found.
 
     Attributes

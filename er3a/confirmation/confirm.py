@@ -146,7 +146,7 @@ class Confirmation(ByValue, Displayed):
         """
         columns = ("line", "mm before", "mm", "deg")
         rows = zip(self.lines.tolist(), self.before_mm, self.left_mm, self.left_deg)
-        return Sheet.of_table(f"Confirmation: {self.verdict}", columns, rows, len(self.lines), self.layers)
+        return Sheet.of_table(f"Confirmation: {self.verdict}", columns, rows, self.layers)
 
     def __bool__(self) -> bool:
         raise TypeError("a confirmation is neither true nor false; read its verdict")

@@ -85,10 +85,13 @@ def _safe(robot: Robot, q: Reals) -> tuple[Reals, bool]:
     """Poses within limits, away from singular ones, the floor and the arm itself; whether it has shapes."""
     q = q[within(robot, q)]
     size = conditioning(robot, q).smallest_singular_value
-    heights = np.concatenate([frames(robot, q)[:, 1:, 2, 3], forward(robot, q)[:, None, 2, 3]], axis=1)
-    q = q[(size > FROM_SINGULAR * size.max(initial=0.0)) & (heights.min(axis=1) > FLOOR_M)]
+    heights = np.minimum(frames(robot, q)[:, 1:, 2, 3].min(axis=1), forward(robot, q)[:, 2, 3])
+    q = q[(size > FROM_SINGULAR * size.max(initial=0.0)) & (heights > FLOOR_M)]
     shapes = bool(robot.envelopes or robot.hulls or robot.meshes)
-    return (q[clearance(robot, q, None).distance > CLEAR_M] if shapes and len(q) else q), shapes
+    if shapes and len(q):
+        gap = clearance(robot, q, None).distance
+        q = q[gap > min(CLEAR_M, gap.max() / 2)]  # some arms are built closer to themselves than CLEAR_M
+    return q, shapes
 
 
 def _effects(robot: Robot, q: Reals) -> Reals:

@@ -116,7 +116,6 @@ class Diagnosis(list[Hypothesis], Displayed):
             f"{heading}: {shortly(self.conclusion)}",
             ("place", "faults", "before", "after", "unit", "explains all"),
             rows,
-            len(self),
             tuple(f"{name}: {value}" for name, value in facts.items() if value),
         )
 

@@ -104,15 +104,14 @@ def read_arm(
         return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
     if path.suffix in URDF:
         from er3a.formats.urdf import import_urdf, urdf_table  # half of what reading an arm needs
-        from er3a.formats.urdf_tree import plain_urdf, srdf_home, tip_after
+        from er3a.formats.urdf_tree import plain_urdf, tip_after
 
         with plain_urdf(path, xacro) as plain:
             if tip is None and joints is not None:
                 tip = tip_after(plain, base, joints)
             if whole:
-                imported = import_urdf(plain, base=base, tip=tip)
-                home = None if srdf is None else srdf_home(srdf, imported.robot, imported.joints)
-                return ReadArm(imported.robot.replace(home=home), False, imported.notes)
+                imported = import_urdf(plain, base=base, tip=tip, srdf=srdf)
+                return ReadArm(imported.robot, False, imported.notes)
             robot, assumed, beside = urdf_table(plain, base=base, tip=tip)
         units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
         return ReadArm(robot, False, assumed, beside, units)
@@ -146,8 +145,8 @@ def load_robot(
     InputError
         naming file, field and remedy
     """
-    given: Any = {"convention": convention, "xacro": xacro, "base": base, "tip": tip}
-    return _warned(name_or_path, read_arm(str(name_or_path), whole=True, **given))
+    arm = read_arm(str(name_or_path), convention=convention, xacro=xacro, base=base, tip=tip, whole=True)
+    return _warned(name_or_path, arm)
 
 
 def _warned(source: str | Path, arm: ReadArm) -> Robot:
@@ -227,8 +226,8 @@ def read_table(
     InputError
         naming the row, column or cell that can't be read, or that can be read in two ways, with both
     """
-    units: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
-    return _warned(source, read_arm(str(source), convention=convention, **units))
+    arm = read_arm(str(source), convention=convention, length_unit=length_unit, angle_unit=angle_unit, columns=columns)
+    return _warned(source, arm)
 
 
 def read_robot(path: Path) -> robot_file.RobotFile:
@@ -251,8 +250,8 @@ def read_robot(path: Path) -> robot_file.RobotFile:
     content = load(robot_file.RobotFile, path)
     if content.name != path.stem:
         raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
-    given = content.named_surfaces()
-    return content.with_surfaces(tuple(read_stl(path.parent / each.stl, each.link, each.sha256) for each in given))
+    found = (read_stl(path.parent / each.stl, each.link, each.sha256) for each in content.named_surfaces())
+    return content.with_surfaces(tuple(found))
 
 
 def robot_path(name_or_path: str | Path) -> Path:
@@ -274,16 +273,15 @@ def robot_path(name_or_path: str | Path) -> Path:
     text = str(name_or_path)
     if text.endswith((".yaml", ".yml")) or ("." in text and holds_table(text)):
         return Path(text)
-    path = _named_file(text)
-    if path is None and text in known_arms():
+    if path := _named_file(text):
+        return path
+    if text in known_arms():
         problem = f"'{text}' is a known arm; a study needs its file"
         raise InputError(None, None, problem, f"Write it: er3a arms {text} --output data/robots/{text}.yaml")
-    if path is None:
-        alike = [name for name in known_arms() if text and text.lower() in name]
-        known = ", ".join(alike or names("data/robots", "*.yaml"))
-        remedy = f"Known: {known}; those of er3a arms; or give a path ending in .yaml"
-        raise InputError(None, None, f"there is no robot '{text}'", remedy)
-    return path
+    alike = [name for name in known_arms() if text and text.lower() in name]
+    known = ", ".join(alike or names("data/robots", "*.yaml"))
+    remedy = f"Known: {known}; those of er3a arms; or give a path ending in .yaml"
+    raise InputError(None, None, f"there is no robot '{text}'", remedy)
 
 
 def robot_of(content: robot_file.RobotFile) -> Robot:

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from er3a.collision import scene as library
+from er3a.files.kept_files import own_or_shipped
 from er3a.files.robot_file import CollisionPairs, DecidedPair, MeshFile, Name, Placement, Text
 from er3a.files.units import MAX_DISTANCE_MM, SHORTEST_PLAIN_LENGTH_MM, PositionMm, RpyDeg, Triple, doubt
 from er3a.files.yaml_file import InputFile, StrictModel, load
@@ -196,12 +197,16 @@ class SceneFile(InputFile):
 def load_scene(path: str | Path) -> library.Scene:
     """Read and check a scene file.
 
+    Parameters
+    ----------
+    path : or its name in ``data/scenes`` of the study, or of er3a
+
     Raises
     ------
     InputError
         naming file, field and remedy
     """
-    return load(SceneFile, path).scene()
+    return load(SceneFile, own_or_shipped(path if Path(path).suffix else f"data/scenes/{path}.yaml")).scene()
 
 
 def _is_pin(xyz_mm: list[float], least: float) -> bool:

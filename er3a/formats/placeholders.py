@@ -44,8 +44,8 @@ def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
     stated = ~robot.slides & ~robot.continuous
     half_turns = np.isclose([-robot.lower, robot.upper], math.pi, rtol=0, atol=ROUNDED_RAD)[:, stated]
     if half_turns.shape[1] >= SEVERAL and half_turns.all():
-        text = "The file gives all joints +-180 deg, which is a placeholder"
-        robot = robot.replace(sources={**robot.sources, "limits": Source(text, "inferred")})
+        source = Source("The file gives all joints +-180 deg, which is a placeholder", "inferred")
+        robot = robot.replace(sources={**robot.sources, "limits": source})
         notes.append("the limits +-180 deg of all joints are a placeholder: what rests on limits is not settled")
     drives, why = robot.masses.drives, _no_efforts(robot)
     alike = [kind for kind in ("coulomb", "viscous") if drives and _alike(getattr(drives, kind))]
@@ -88,7 +88,7 @@ def _no_masses(robot: Robot) -> str:
         return f"all links have the moment of inertia {moments[0][0]:g} kg m2 about each axis"
     away = {each.link: _outside(robot, each.link, np.array(each.body.centre)) for each in links}
     if far := {link: distance for link, distance in away.items() if distance > OUTSIDE_M}:
-        link = max(far, key=lambda each: far[each])
+        link = max(far, key=far.__getitem__)
         more = f" and {len(far) - 1} more" if len(far) > 1 else ""
         return f"the centre of mass of link {link}{more} is {1000 * far[link]:.0f} mm outside of the link"
     about = [found.link for found in mass_findings(robot) if is_one(found, "about_origin")] if masses else []

@@ -80,6 +80,7 @@ def import_urdf(
     tip: str | None = None,
     snap: bool = True,
     xacro: Sequence[str] = (),
+    srdf: str | Path | None = None,
 ) -> UrdfImport:
     """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
     Links none of whose collision shapes can be read are checked as they look, and so are those that look larger than
@@ -99,6 +100,7 @@ def import_urdf(
     snap : take angles that the file shows rounded (1.571, 0.785) as the multiples of 45 deg that they stand for; one
         note says how many, and by how much that moves the flange
     xacro : arguments of a xacro file, ``NAME:=VALUE``
+    srdf : from which home is taken, see :func:`er3a.formats.urdf_tree.srdf_home`; a note says if it gives none
 
     Raises
     ------
@@ -106,7 +108,12 @@ def import_urdf(
         if the file is not a URDF, has several arms (candidates are named), or no arm of 1 to 10 joints
     """
     with urdf_tree.plain_urdf(Path(path), xacro) as plain:
-        return _imported(plain, base, tip, snap)
+        found = _imported(plain, base, tip, snap)
+    if srdf is None:
+        return found
+    home = urdf_tree.srdf_home(Path(srdf), found.robot, found.joints)
+    lacking = [f"{Path(srdf).name} has no regular state of all joints: home is chosen"] * (home is None)
+    return replace(found, robot=found.robot.replace(home=home), notes=(*found.notes, *lacking))
 
 
 def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> UrdfImport:
@@ -196,12 +203,15 @@ def _robot_of_chain(
     sliding = np.array([joint.type == "prismatic" for joint in moving])
     table = table_from_axes(directions, points, T)
     plain = np.array_equal(coupling, np.eye(*coupling.shape))
-    limits, notes, assumed = _limits(sources)
+    limits, said, assumed = _limits(sources)
     speed = np.array([joint.speed for joint in sources])
     unknown = ~((speed > 0) & (speed < FASTEST))
-    notes += [
-        f"joint {sources[k].name} has a speed of {speed[k]:g} {'m/s' if sources[k].type == 'prismatic' else 'rad/s'}, "
-        "which counts as unknown; a URDF's are in radians and metres"
+    said += [
+        (
+            f"has a speed of {speed[k]:g} {'m/s' if sources[k].type == 'prismatic' else 'rad/s'}, which counts as "
+            "unknown; a URDF's are in radians and metres",
+            sources[k].name,
+        )
         for k in np.flatnonzero(unknown & np.isfinite(speed) & (speed != 0))
     ]
     speed[unknown] = math.nan
@@ -230,7 +240,7 @@ def _robot_of_chain(
         continuous=continuous,
         **vars(table),
     )
-    return robot, sources, coupling, shift, [*notes, *more]
+    return robot, sources, coupling, shift, [*urdf_tree.by_note(said), *more]
 
 
 def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlaces:
@@ -421,27 +431,27 @@ def _motion(joint: urdf_tree.UrdfJoint, values: Reals) -> Reals:
     return T
 
 
-def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[str]]:
-    """Limits (n, 2), rad or m, notes, and the joints that the file gives none, none that can be, or some that may be
-    in degrees."""
-    rows, notes, assumed = [], [], []
+def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[tuple[str, str]], list[str]]:
+    """Limits (n, 2), rad or m, notes with their joints, and the joints that the file gives none, none that can be, or
+    some that may be in degrees."""
+    rows, said, assumed = [], [], []
     for joint in sources:
         lower, upper, turns = joint.lower, joint.upper, joint.type == "revolute"
         widest, shown = max(abs(lower), abs(upper)), f"limits of {lower:g} to {upper:g}"
         if joint.type == "continuous":
-            notes.append(f"joint {joint.name} is continuous: one turn is sampled")
+            said.append(("is continuous: one turn is sampled", joint.name))
             lower, upper = -math.pi, math.pi
         elif not widest <= (urdf_tree.MAX_TURNED if turns else MAX_SLID_M):
             none = "no limits" if math.isnan(lower) else f"{shown}, which no joint has"
             half, assumed_as = (NO_RANGE, "180 deg") if turns else (NO_SLIDE_M, f"{NO_SLIDE_M * 1000:g} mm")
-            notes.append(f"joint {joint.name} has {none}: +-{assumed_as} were assumed")
+            said.append((f"has {none}: +-{assumed_as} were assumed", joint.name))
             assumed.append(joint.name)
             lower, upper = -half, half
         elif turns and widest > MANY_TURNS:
-            notes.append(f"joint {joint.name} has {shown} rad, more than two turns; a URDF's are in radians")
+            said.append((f"has {shown} rad, more than two turns; a URDF's are in radians", joint.name))
             assumed.append(joint.name)
         rows.append((lower, upper))
-    return np.array(rows), notes, assumed
+    return np.array(rows), said, assumed
 
 
 def _held_by_followers(

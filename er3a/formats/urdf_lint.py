@@ -8,7 +8,7 @@ are in metres and angles in radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -17,12 +17,22 @@ import numpy as np
 from er3a.errors import InputError
 from er3a.finding import Finding, fact
 from er3a.formats.mesh_file import read_link_mesh, read_text
-from er3a.formats.urdf_tree import FAR_APART_M, MAX_BYTES, MOVING, WHOLE_TURN, body_of, mesh_of, number_of, numbers_of
+from er3a.formats.urdf_tree import (
+    FAR_APART_M,
+    MAX_BYTES,
+    MOVING,
+    WHOLE_TURN,
+    body_of,
+    mesh_of,
+    number_of,
+    numbers_of,
+    plain_urdf,
+)
 from er3a.programs.instructions import Place
 from er3a.robots.masses import no_body
 from er3a.xml_lines import LINE, read_xml
 
-WRONG = ("urdf_lengths", "urdf_angles", "urdf_limits_reversed", "urdf_inertia")
+WRONG = ("urdf_lengths", "urdf_angles", "urdf_limits_reversed", "urdf_inertia", "urdf_mesh_unusable")
 """Rules of numbers that can't be meant; the others name what is missing or no data."""
 MANY_TURNS = 10 * 2 * math.pi
 NONE = (0.0, 0.0, 0.0)
@@ -33,44 +43,31 @@ Broken = tuple[str, Element, str]
 """A rule, the element that breaks it, and its name or value."""
 
 
-def lint(path: Path) -> tuple[tuple[Finding, Place], ...]:
+def lint(path: Path, xacro: Sequence[str] = ()) -> tuple[tuple[Finding, Place], ...]:
     """The rules that a URDF breaks.
 
     Parameters
     ----------
-    path : of a URDF that can be read; of xacro, which has to be expanded before, nothing is said
+    path : of a URDF that can be read, or of xacro, of which the expanded URDF is looked at
+    xacro : arguments of a xacro file, ``NAME:=VALUE``
 
     Returns
     -------
     found : one finding for each rule, ``names`` being the elements (at most as many as are printed), and the line of
-        the first
+        the first; line 1 of xacro, in which no element of the expanded URDF has a line
 
     Raises
     ------
     InputError
         for what is no XML
     """
-    text = read_text(path, MAX_BYTES)
-    if "<xacro:" in text or "$(" in text:
-        return ()
-    root = read_xml(text, path)
-    broken: dict[str, list[tuple[Element, str]]] = {}
-    for code, element, name in (*_of_joints(path, root), *_of_links(path, root)):
-        broken.setdefault(code, []).append((element, name))
-    return tuple(
-        (fact(code, names=tuple(dict.fromkeys(name for _, name in where))), Place(path, int(where[0][0].attrib[LINE])))
-        for code, where in broken.items()
-    )
-
-
-def is_wrong(found: Finding) -> bool:
-    """Whether a rule that a file breaks is one of numbers that can't be meant.
-
-    Parameters
-    ----------
-    found : of :func:`lint`
-    """
-    return found.code in WRONG
+    broken: dict[str, tuple[Place, dict[str, None]]] = {}
+    with plain_urdf(path, xacro) as plain:
+        root = read_xml(read_text(plain, MAX_BYTES), plain)
+        for code, element, name in (*_of_joints(plain, root), *_of_links(plain, root)):
+            line = int(element.attrib[LINE]) if plain == path else 1
+            broken.setdefault(code, (Place(path, line), {}))[1][name] = None
+    return tuple((fact(code, names=tuple(names)), place) for code, (place, names) in broken.items())
 
 
 def _of_joints(path: Path, root: Element) -> Iterator[Broken]:
@@ -85,18 +82,18 @@ def _of_joints(path: Path, root: Element) -> Iterator[Broken]:
         name, limit = joint.get("name", "?"), joint.find("limit")
         axis = numbers_of(path, name, joint.find("axis"), "xyz", (1.0, 0.0, 0.0))
         lower, upper = number_of(limit, "lower"), number_of(limit, "upper")
-        slides, endless = joint.get("type") == "prismatic", joint.get("type") == "continuous"
+        slides = joint.get("type") == "prismatic"
         if abs(np.linalg.norm(axis) - 1) > AXIS_OFF:
             yield "urdf_axis", joint, name
         if lower > upper:
             yield "urdf_limits_reversed", joint, name
         if max(abs(lower), abs(upper)) > (FAR_APART_M if slides else MANY_TURNS):
             yield "urdf_lengths" if slides else "urdf_angles", joint, name
-        if not endless and (math.isnan(lower) or math.isnan(upper) or lower == upper):
+        if joint.get("type") != "continuous" and not abs(upper - lower) > 0:
             yield "urdf_no_limits", joint, name
-        for key, code in (("velocity", "urdf_no_velocity"), ("effort", "urdf_no_effort")):
+        for key in ("velocity", "effort"):
             if joint.find("mimic") is None and not number_of(limit, key) > 0:
-                yield code, joint, name
+                yield f"urdf_no_{key}", joint, name
     yield from _alike(moving, [number_of(joint.find("limit"), "effort") for joint in moving], "urdf_efforts_alike")
 
 
@@ -106,31 +103,27 @@ def _of_links(path: Path, root: Element) -> Iterator[Broken]:
     masses = [number_of(link.find("inertial/mass"), "value") for link in links]
     yield from _alike(links, masses, "urdf_masses_alike")
     for link, mass in zip(links, masses):
-        name = link.get("name", "?")
-        if link.find("visual") is not None and not mass > 0:
-            yield "urdf_no_mass", link, name
-        if link.find("visual") is not None and link.find("collision") is None:
-            yield "urdf_no_collision", link, name
-        inertial = link.find("inertial")
+        name, inertial = link.get("name", "?"), link.find("inertial")
+        if link.find("visual") is not None:
+            if not mass > 0:
+                yield "urdf_no_mass", link, name
+            if link.find("collision") is None:
+                yield "urdf_no_collision", link, name
         try:
             if inertial is not None and mass > 0 and no_body(body_of(name, inertial)[0]):
                 yield "urdf_inertia", link, name
         except InputError:  # an inertia that is no numbers
             yield "urdf_inertia", link, name
     for mesh in root.findall("link/collision/geometry/mesh"):
-        yield from _of_mesh(path, mesh)
-
-
-def _of_mesh(path: Path, mesh: Element) -> Iterator[Broken]:
-    name = mesh.get("filename", "")
-    file = mesh_of(path, name)
-    if file is None:
-        yield "urdf_mesh_missing", mesh, name
-        return
-    try:
-        read_link_mesh(file, numbers_of(path, name, mesh, "scale", (1.0, 1.0, 1.0)))
-    except InputError as error:
-        yield "urdf_mesh_unusable", mesh, f"{name}: {error.problem}"
+        name = mesh.get("filename", "")
+        file = mesh_of(path, name)
+        if file is None:
+            yield "urdf_mesh_missing", mesh, name
+            continue
+        try:
+            read_link_mesh(file, numbers_of(path, name, mesh, "scale", (1.0, 1.0, 1.0)))
+        except InputError as error:
+            yield "urdf_mesh_unusable", mesh, f"{name}: {error.problem}"
 
 
 def _alike(elements: list[Element], values: list[float], code: str) -> Iterator[Broken]:

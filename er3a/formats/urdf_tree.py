@@ -285,8 +285,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
         above = [joints[0].parent, *(joint.child for joint in joints)] if joints else [tip]
         if base is not None and base not in above:
             raise InputError(path, "--base", f"link '{base}' is not above '{tip}'", f"Give one of {_some(above)}")
-        first = above.index(base) if base is not None else 0
-        joints = joints[first:]
+        joints = joints[above.index(base) if base is not None else 0 :]
     else:
         joints = _downwards(tree, base or _root(tree), notes)
     joints = [*back, *joints]
@@ -310,7 +309,16 @@ def _notes_of(tree: Tree, joints: Sequence[UrdfJoint]) -> Iterator[str]:
     """The notes on joints, one for all joints of which the same is said, and one on those beyond the last."""
     if joints and (moving := tree.onward(link := joints[-1].child)[0]):
         yield f"beyond the arm's last link {link} joints are kept at 0, as of a gripper: {_some(_names(moving))}"
-    said = [(note, joint.name) for joint in joints for note in joint.notes]
+    yield from by_note([(note, joint.name) for joint in joints for note in joint.notes])
+
+
+def by_note(said: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """One note for all joints of which the same is said.
+
+    Parameters
+    ----------
+    said : note and joint
+    """
     for note in dict(said):
         first, *others = [name for each, name in said if each == note]
         yield f"joint {first} {note}" + (f"; likewise {_some(others)}" if others else "")
@@ -446,12 +454,12 @@ def srdf_home(path: Path, robot: Robot, joints: Sequence[str]) -> Reals | None:
 
     Returns
     -------
-    q : (n,), rad or m; None where only near-singular states are given
+    q : (n,), rad or m; None where no state gives all joints, or only near-singular ones do
 
     Raises
     ------
     InputError
-        for a file that is none, and one in which no state gives all joints
+        for a file that is none
     """
     states: dict[str, Reals] = {}
     with plain_urdf(path) as plain:
@@ -461,8 +469,6 @@ def srdf_home(path: Path, robot: Robot, joints: Sequence[str]) -> Reals | None:
         if values.keys() >= set(joints):
             given = [numbers_of(path, f"group_state {name}", values[joint], "value", None)[0] for joint in joints]
             states[name] = np.array(given)
-    if not states:
-        raise InputError(path, "group_state", f"none gives {_some(list(joints))}", "Write home_deg into the robot file")
     return states.get("home", next((q for q in states.values() if not USUAL_NEAR.contains(robot, q[None])[0]), None))
 
 

@@ -199,14 +199,14 @@ def nearest_rotations(M: Reals) -> Reals:
 
 
 def warn_of_rounding(what: str, off: float) -> None:
-    """Warn (``er3a.InputWarning``) of a rotation that was typed with few decimals: the nearest one is taken.
+    """Warn (``er3a.InputWarning``) of what was typed with few decimals: the nearest that can be is taken.
 
     Parameters
     ----------
     off : by which its elements, or a quaternion's length, are off; up to ``ORTHONORMAL_TOLERANCE`` nothing is said
     """
     if off > ORTHONORMAL_TOLERANCE:
-        warnings.warn(f"{what} is rounded: the nearest rotation is taken, {off:.1g} off", InputWarning, stacklevel=5)
+        warnings.warn(f"{what} is rounded: the nearest is taken, {off:.1g} off", InputWarning, stacklevel=5)
 
 
 SMALL_TURN = 1e-4  # rad; below, series replace quotients of vanishing numbers

@@ -326,16 +326,16 @@ def nearest_value(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Reals:
     """
     tried, parameter = _scanned(robot, TRIED), parameters_of(robot)[0]
     turns = parameter.joint < 0 or not robot.sliding[parameter.joint]
-    step = tried[1] - tried[0]
+    step, most = tried[1] - tried[0], TRIED
     for _ in range(1 + CLOSER):
         away = np.abs(np.remainder(tried - values + np.pi, 2 * np.pi) - np.pi if turns else tried - values)
-        tried = tried[away[:, 0].argsort(kind="stable")]
+        tried = tried[away[:, 0].argsort(kind="stable")[:most]]
         q = nearest_equivalent(robot, class_rows(robot, np.broadcast_to(T, (len(tried), 4, 4)), tried).q, q_ref)
         fits = np.flatnonzero(within(robot, q).any(axis=1))
         if not fits.size:
             return values
         found = tried[fits[:1]]
-        tried, step = found + step * np.linspace(-1, 1, 9)[:, None], step / 4
+        tried, step, most = found + step * np.linspace(-1, 1, 9)[:, None], step / 4, 5  # no farther than found
     return found
 
 

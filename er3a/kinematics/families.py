@@ -28,7 +28,7 @@ from er3a.geometry.vectors import TURN, signed_angle, wrap_to_pi
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.forward import forward, frames, jacobian
-from er3a.kinematics.self_motions import last_within, place_of_least
+from er3a.kinematics.self_motions import last_within, line_of, place_of_least
 from er3a.kinematics.singularity import SingularityType, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
@@ -280,13 +280,7 @@ class Family(ByValue, Displayed):
         -------
         sheet : without rows
         """
-        low, high = np.degrees(self.range).tolist()
-        within = "within the limits" if self.within_limits else "outside the limits"
-        q0 = shortly(tuple(np.degrees(self.q0).tolist()))
-        of_surface = f", one curve of a surface of dimension {self.dimension}" if self.dimension > 1 else ""
-        return Sheet(
-            f"Family {self.kind}, t from {shortly(low)} to {shortly(high)} deg, {within}, q0_deg {q0}{of_surface}"
-        )
+        return line_of(self, f"Family {self.kind}", f"q0_deg {shortly(tuple(np.degrees(self.q0).tolist()))}")
 
 
 def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ...]:

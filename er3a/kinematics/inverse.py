@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
 from er3a.finding import Finding, fact, is_one
-from er3a.geometry.transforms import typed_pose
+from er3a.geometry.transforms import typed_pose, warn_of_rounding
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
 from er3a.kinematics.by_class import confirms, meets_poses, misses, task_mask
@@ -39,6 +39,7 @@ from er3a.robots.whole_turns import turns_alone
 SAME_JOINTS = 1e-9  # rad: rows so near to each other are one
 SAME_MEMBER = 1e-6  # rad or m: a member of a self-motion so near to a row is listed already
 MISSED = 1e-4  # rad or m from all rows
+TYPED = 2e-3  # m and rad, that three decimals in a pose are off by, half of it in its rotation
 SOLVES = 1e-12  # m and parts of 1
 MOST_AT_ONCE = 1024  # turns of a pose; more take the longer way
 STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere
@@ -64,7 +65,8 @@ def inverse(
 
     Parameters
     ----------
-    T : (4, 4), T_base_tool, m; of a rotation with three decimals the nearest is taken, and a warning says how far it is
+    T : (4, 4), T_base_tool, m; of a rotation with three decimals the nearest is taken, and a warning says how far it
+        is; and of five joints then the nearest pose that they can do, up to ``TYPED`` away
     q_ref : (n,), rad or m, reference for the choice of members of self-motions and of whole turns: in each branch the
         nearest turn comes first. None means zeros.
     redundancy : (k,), values of the redundancy parameters (``parameters_of``): an arm angle in rad, or a joint's value;
@@ -83,12 +85,17 @@ def inverse(
     """
     if (at_once := _at_once(robot, T, q_ref)) is not None:
         return at_once
-    T = typed_pose(T)
+    given, T = T, typed_pose(T)
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
     q_ref = checked_reference(robot, q_ref)
     if wrist_partition_missing(robot) or robot.coupling is not None:
         found = _by_class(robot, T, q_ref, redundancy, self_motion_rows)
+        if not len(found.q) and robot.joints == 5 and (given != T).any():
+            near = missed_row(robot, T, q_ref)  # no typed pose is exactly one of five joints
+            if (off := max(map(float, misses(robot, T, near.q)))) <= TYPED:
+                warn_of_rounding("T, for five joints,", off)
+                return inverse(robot, forward(robot, near.q), q_ref)
     else:
         found = _by_closed_form(robot, T, q_ref)
     return _at_exit(robot, found, T, q_ref if redundancy is None and not found.regular else None)
@@ -186,10 +193,7 @@ def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> soluti
         kept = np.isfinite(rows[:, 0])
         if not kept.any():
             position, rotation, _ = misses(robot, T, q)
-            nearest = fact(
-                "nearest_miss", position_mm=float(position.min() * 1000), rotation_deg=float(np.degrees(rotation.min()))
-            )
-            unsolved = (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=nearest)),)
+            unsolved = _no_row(position.min(), rotation.min())
         q, branch = rows[kept], branch[kept]
     if own is not None and within(robot, own) and np.abs(forward(robot, own) - T).max() <= SOLVES:
         away = max_joint_move(q, own)
@@ -269,11 +273,15 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
             rows, branches = _near_solved(robot, T, near.q, q_ref)
             certain = False
         else:
-            position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
-            miss = fact("nearest_miss", position_mm=position * 1000, rotation_deg=float(np.degrees(rotation)))
-            unsolved = (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=miss)),)
+            unsolved = _no_row(near.position_error, near.rotation_error)
     method = fact("by_class", arm_class=solver.code, certain=bool(certain), named=bool(solutions.slot_labels(robot)))
     return _Found(rows, branches, method, unsolved, traced)
+
+
+def _no_row(position: Any, rotation: Any) -> tuple[solutions.Unsolved, ...]:
+    """Why a pose has no row: by how much (m, rad) the nearest one misses it."""
+    miss = fact("nearest_miss", position_mm=float(position * 1000), rotation_deg=float(np.degrees(rotation)))
+    return (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=miss)),)
 
 
 def _distance(rows: Reals, q: Reals) -> float:
@@ -412,21 +420,10 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 
 def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.Unsolved, ...]:
     """Why a shoulder side has no branch: by that of its four slots which misses least."""
-    found = []
-    sides = {slot // 4 for slot in np.flatnonzero(fault == REACHED).tolist()}
-    for shoulder in (0, 1):
-        if shoulder in sides:
-            continue
-        part = slice(4 * shoulder, 4 * shoulder + 4)
-        best = 4 * shoulder + int(np.argmin(gap[part]))
-        found.append(
-            fact(
-                "side_unsolved",
-                side=solutions.side_of(robot, best),
-                why=_out_of_reach(robot, int(fault[best]), float(gap[best])),
-            )
-        )
-    return tuple(found)
+    sides = {0, 4} - {4 * (slot // 4) for slot in np.flatnonzero(fault == REACHED).tolist()}
+    best = [side + int(np.argmin(gap[side : side + 4])) for side in sorted(sides)]
+    whys = [_out_of_reach(robot, int(fault[slot]), float(gap[slot])) for slot in best]
+    return tuple(fact("side_unsolved", side=solutions.side_of(robot, slot), why=why) for slot, why in zip(best, whys))
 
 
 def _out_of_reach(robot: Robot, fault: int, gap: float) -> Finding:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -79,12 +79,22 @@ class SelfMotionCurve(ByValue, Displayed):
         -------
         sheet : without rows
         """
-        low, high = np.degrees(self.range).tolist()
-        within = "within the limits" if self.within_limits else "outside the limits"
         values = zip(joint_columns(self.robot), shown(self.robot, self.q0).tolist())
-        q0 = ", ".join(f"{name} {shortly(value)}" for name, value in values)
-        of_surface = f", one curve of a surface of dimension {self.dimension}" if self.dimension > 1 else ""
-        return Sheet(f"Self-motion, t from {shortly(low)} to {shortly(high)} deg, {within}, q0: {q0}{of_surface}")
+        return line_of(self, "Self-motion", "q0: " + ", ".join(f"{name} {shortly(value)}" for name, value in values))
+
+
+def line_of(motion: Any, name: str, q0: str) -> Sheet:
+    """A self-motion in a line, for printing: what it is, its range (deg), and its nearest member.
+
+    Parameters
+    ----------
+    motion : with ``range``, ``within_limits`` and ``dimension``
+    name, q0 : texts
+    """
+    low, high = np.degrees(motion.range).tolist()
+    within = "within the limits" if motion.within_limits else "outside the limits"
+    of_surface = f", one curve of a surface of dimension {motion.dimension}" if motion.dimension > 1 else ""
+    return Sheet(f"{name}, t from {shortly(low)} to {shortly(high)} deg, {within}, {q0}{of_surface}")
 
 
 def _joints(robot: Robot, x: Reals) -> Reals:

@@ -73,7 +73,7 @@ class Conditioning(Displayed):
         """
         measures = [np.ravel(getattr(self, each.name)) for each in fields(self)]
         columns, count = tuple(each.name.replace("_", " ") for each in fields(self)), len(measures[0])
-        return Sheet.of_table(f"Conditioning at {count} joint vector(s)", columns, zip(*measures), count)
+        return Sheet.of_table(f"Conditioning at {count} joint vector(s)", columns, zip(*measures))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.errors import with_extra
 from er3a.finding import Finding, fact, is_one
-from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
@@ -32,7 +31,7 @@ from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import has_branches, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import but_for_turns, joint_columns, limits_exceeded, shown
-from er3a.robots.robot import Robot, derived
+from er3a.robots.robot import Robot, derived, placement_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -283,7 +282,6 @@ class Solutions(ByValue, Displayed):
             f"Solutions of one pose of {self.robot.name}: {self._counted()} ({self.method.code})",
             ("row", "branch", *joint_columns(self.robot), *("turned_deg" for _ in turned), "within", "reason"),
             rows,
-            len(self.q),
             facts=(
                 *(f"self-motion: {family!r}" for family in self.families),
                 *(f"unsolved: {shortly(why)}" for why in self.unsolved),
@@ -324,8 +322,7 @@ class Target(ByValue, Displayed):
         -------
         sheet : without rows
         """
-        xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * self.T[:3, 3], np.degrees(rpy_of(self.T))))
-        return Sheet(f"Target {self.name}: xyz_mm {xyz}; rpy_deg {rpy}")
+        return Sheet(f"Target {self.name}: {placement_text(self.T)}")
 
     @property
     def q_ref(self) -> Reals:

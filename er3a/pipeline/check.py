@@ -38,7 +38,7 @@ from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import TargetFile, load_targets, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
-from er3a.formats.urdf_lint import is_wrong, lint
+from er3a.formats.urdf_lint import WRONG, lint
 from er3a.pipeline.messages.urdf import rule_text
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
@@ -113,12 +113,13 @@ def _check_vision(path: Path) -> None:
 URDF_FILE = "a URDF"
 
 
-def rules_broken(path: Path, kind: str) -> list[tuple[LocatedFinding, str]]:
+def rules_broken(path: Path, kind: str, xacro: Sequence[str] = ()) -> list[tuple[LocatedFinding, str]]:
     """The rules that a URDF breaks, each with its text.
 
     Parameters
     ----------
     kind : of the file, as :func:`check_file` says it; no others have rules
+    xacro : arguments of a xacro file, ``NAME:=VALUE``
 
     Raises
     ------
@@ -128,8 +129,8 @@ def rules_broken(path: Path, kind: str) -> list[tuple[LocatedFinding, str]]:
     if kind != URDF_FILE:
         return []
     return [
-        (LocatedFinding("fail" if is_wrong(found) else "caution", found, place), rule_text(found))
-        for found, place in lint(path)
+        (LocatedFinding("fail" if found.code in WRONG else "caution", found, place), rule_text(found))
+        for found, place in lint(path, xacro)
     ]
 
 

@@ -352,7 +352,7 @@ class Followed(ByValue, Displayed):
             for (first, last), way in zip(self.out_of_reach, ways)
         ]
         notes = (*facts, "a row for each time of yours: .joints(t), in rad")
-        return Sheet.of_table(found, columns, rows, len(rows), notes)
+        return Sheet.of_table(found, columns, rows, notes)
 
     def joints(self, t: Reals) -> Reals:
         """Joint angles at times, by the closed form of the branch followed there.

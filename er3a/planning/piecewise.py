@@ -171,7 +171,7 @@ class PiecewiseMotion(ByValue, Displayed):
         rows = np.column_stack([self.times, self.joints(self.times)])
         columns = ("t (s)", *(f"J{joint} (rad or m)" for joint in range(1, rows.shape[1])))
         heading = f"Motion in {len(self.times) - 1} piece(s) over {self.duration:g} s"
-        return Sheet.of_table(heading, columns, rows, len(rows), ("joints at times of yours: .joints(t)",))
+        return Sheet.of_table(heading, columns, rows, ("joints at times of yours: .joints(t)",))
 
     @property
     def duration(self) -> float:

@@ -195,10 +195,12 @@ class ProgramCheck(ByValue, Displayed):
 
     def sheet(self) -> Sheet:
         """The level, how many motions pass, and a row for each finding."""
-        passed = sum(each.level == "pass" for each in self.verdicts)
-        heading = f"{self.execution.program.name}: {self.level}, {passed} of {len(self.verdicts)} motions pass"
-        rows = ((each.place.line, each.level, each.finding) for each in self.findings)
-        return Sheet.of_table(heading, ("line", "level", "finding"), rows, len(self.findings))
+        levels = [each.level for each in self.verdicts]
+        return Sheet.of_table(
+            f"{self.execution.program.name}: {self.level}, {levels.count('pass')} of {len(levels)} motions pass",
+            ("line", "level", "finding"),
+            ((each.place.line, each.level, each.finding) for each in self.findings),
+        )
 
     @property
     def arms(self) -> tuple[tuple[str, Robot], ...]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Displayed
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place
 from er3a.programs.syntax import Program, Value
@@ -91,8 +91,8 @@ class Ending:
     entry: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Execution(ByValue):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Execution(ByValue, Displayed):
     """A program that was run.
 
     Attributes

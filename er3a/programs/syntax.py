@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Displayed
 from er3a.finding import Finding
 from er3a.programs.instructions import Instruction, Place, Rate, RateUnit
 from er3a.programs.program_names import LanguageName
@@ -411,8 +411,8 @@ class Routine:
     thread: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Program(ByValue):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Program(ByValue, Displayed):
     """A program that was read.
 
     Attributes

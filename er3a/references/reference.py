@@ -299,14 +299,13 @@ class ReferenceSet(Displayed):
         -------
         sheet : a row for each group, in alphabetical order
         """
-        groups = sorted({each.group for each in self.references})
         rows = (
             (group, len(own), tuple(sorted({each.grade for each in own})))
-            for group in groups
+            for group in sorted({each.group for each in self.references})
             for own in [[each for each in self.references if each.group == group]]
         )
         heading = f"Reference set {self.name}: {len(self.references)} numbers, {len(self.checkable)} to check against"
-        return Sheet.of_table(heading, ("group", "numbers", "grades"), rows, len(groups))
+        return Sheet.of_table(heading, ("group", "numbers", "grades"), rows)
 
 
 def quantities_of(references: Iterable[Reference]) -> tuple[Quantity, ...]:

@@ -435,7 +435,7 @@ class Robot(ByValue, Displayed):
             tuple(columns),
             tuple(tuple(shortly(value) for value in row) for row in zip(*columns.values())),
             facts=(
-                *(f"{name}: {_placement(T)}" for name, T in placed if (np.eye(4) != T).any()),
+                *(f"{name}: {placement_text(T)}" for name, T in placed if (np.eye(4) != T).any()),
                 *([f"references: {', '.join(self.references)}"] if self.references else []),
             ),
         )
@@ -479,8 +479,13 @@ def robot_name(path: Path) -> str:
     return name or "imported"
 
 
-def _placement(T: Reals) -> str:
-    """Position in mm and roll, pitch, yaw in deg, as text."""
+def placement_text(T: Reals) -> str:
+    """Position in mm and roll, pitch, yaw in deg, as text.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    """
     xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * T[:3, 3], np.degrees(rpy_of(T))))
     return f"xyz_mm {xyz}; rpy_deg {rpy}"
 

@@ -265,8 +265,7 @@ class SolutionRanking(ByValue, Displayed):
         units = [f"{name} ({self.units[name]})" for name in self.measured]
         heading = f"Ranking of {len(self.reason)} solutions, {len(self.order)} admissible"
         taken = f"row {self.chosen} is taken" if len(self.order) else f"none is taken: {shortly(self.chosen_reason)}"
-        columns = ("place", "row", "cost", *units, "refused")
-        return Sheet.of_table(f"{heading}; {taken}", columns, rows, len(self.reason))
+        return Sheet.of_table(f"{heading}; {taken}", ("place", "row", "cost", *units, "refused"), rows)
 
 
 def select(
@@ -417,11 +416,10 @@ class SequenceChoice(ByValue, Displayed):
         -------
         sheet : a row for each pose, and the total cost compared with taking the cheapest next move each time
         """
-        values = zip(range(len(self.q)), self.rows, shown(self.robot, self.q), strict=True)
-        rows = ((pose, row, *joints) for pose, row, joints in values)
+        values = zip(self.rows, shown(self.robot, self.q), strict=True)
+        rows = ((pose, row, *joints) for pose, (row, joints) in enumerate(values))
         heading = f"Sequence of {len(self.q)} poses: cost {self.cost:.6g}; nearest each time: {self.greedy_cost:.6g}"
-        columns = ("pose", "row", *joint_columns(self.robot))
-        return Sheet.of_table(heading, columns, rows, len(self.q))
+        return Sheet.of_table(heading, ("pose", "row", *joint_columns(self.robot)), rows)
 
 
 def select_sequence(

@@ -66,7 +66,7 @@ class CalibrationSet(ByValue, Displayed):
         """
         rows = zip(self.names, *(1000 * self.flange[:, :3, 3].T), *(1000 * self.target[:, :3, 3].T))
         columns = ("sample", *(f"{part}_{c}_mm" for part in ("flange", "board") for c in "xyz"))
-        return Sheet.of_table(f"{len(self)} samples, {self.setup.replace('_', ' ')}", columns, rows, len(self))
+        return Sheet.of_table(f"{len(self)} samples, {self.setup.replace('_', ' ')}", columns, rows)
 
     def __post_init__(self) -> None:
         for name in ("flange", "target"):

@@ -418,7 +418,7 @@ class HandEye(ByValue, Displayed):
         found = [*self.suspects, *self.warnings]
         facts = tuple(shortly(each) for each in found[:MAX_FACTS])
         heading = f"Hand-eye calibration, {int(self.used.sum())} of {len(self.samples)} samples used"
-        return Sheet.of_table(heading, columns, rows, len(rows), facts)
+        return Sheet.of_table(heading, columns, rows, facts)
 
     @property
     def copies(self) -> tuple[str, ...]:

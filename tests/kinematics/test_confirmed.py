@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from er3a.errors import InputWarning
 from er3a.geometry.transforms import transform
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics import by_class
@@ -143,6 +144,23 @@ def test_five_joints_leave_open_only_the_turn_about_the_tool_s_own_axis(random):
                     assert (np.diff(np.where(freed < 1e-9, 0, freed)) >= 0).all()
                 else:
                     np.testing.assert_allclose(freed[0][batch.solved[0]], rotation, atol=1e-9)
+
+
+def test_a_pose_that_five_joints_miss_by_its_rounding_is_taken_as_the_nearest_they_can_do(random):
+    robot = along_x(np.eye(4))
+    for q in random.uniform(robot.lower, robot.upper, (10, 5)):
+        T = np.round(tools_by_hand(robot.replace(tool=robot.flange, flange=np.eye(4)), q[None])[0], 3)
+        with pytest.warns(InputWarning) as warned:
+            found = inverse(robot, T, q)
+        assert len(warned) == 2  # of the rotation, and of the pose
+        position, rotation, _ = misses_of(robot, found.q, T)
+        assert len(found.q)
+        assert max(position.max(), rotation.max()) < 2e-3
+        assert np.ptp(position) < 1e-8
+        assert np.ptp(rotation) < 1e-8
+        T[:3, 3] = Rotation.from_euler("z", 0.1).apply(T[:3, 3])  # the tool points out of the arm's plane
+        with pytest.warns(InputWarning, match="T's rotation"):
+            assert not len(inverse(robot, T, q).q)
 
 
 def misses_of(robot: Robot, rows: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -25,7 +25,14 @@ from er3a.collision.matrix import base_contacts, solids_met
 from er3a.collision.meshes import hull_faces
 from er3a.collision.pairs import ASSUMED_MARGIN, label_of, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
-from er3a.collision.shapes import arm_shapes, covered_lengths, has_bare_tool, link_frames, shapes_assumed
+from er3a.collision.shapes import (
+    arm_shapes,
+    covered_lengths,
+    default_envelopes,
+    has_bare_tool,
+    link_frames,
+    shapes_assumed,
+)
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
@@ -808,6 +815,18 @@ def test_a_shape_that_covers_a_small_part_of_its_link_is_no_pass(link, end, shar
             assert ("parts of links" in say(assumed)) == (grade == "official")
             summary = Summary(Verdict("pass", FREE), (), checked=coverages({"self_collision": 8}, [left]))
             assert summary.verdict.status == "caution"
+
+
+def test_a_base_that_is_drawn_has_no_length_below_what_is_drawn_of_it():
+    """A URDF whose world is a floor 0.75 m below the arm draws nothing there."""
+    ur, foot = load_robot("ur5e"), np.array([[0.1, 0, 0.75], [-0.1, 0.1, 0.75], [-0.1, -0.1, 0.75], [0, 0, 0.9]])
+    table = ur.d.copy()
+    table[0] += 0.75
+    mesh = LinkMesh(0, foot, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    rest = tuple(each for each in default_envelopes(ur) if each.link)
+    arm = ur.replace(d=table, envelopes=rest, hulls=(), meshes=(mesh,), visuals=(), pair_rules=())
+    assert [link for link, _ in arm_shapes(arm).partial] == [0]
+    assert arm_shapes(arm.replace(visuals=(mesh,))).partial == ()
 
 
 def test_shapes_beside_the_tables_lines_cover_their_links():

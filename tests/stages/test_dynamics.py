@@ -290,7 +290,7 @@ def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):
     found = computed(tmp_path, a_study(tmp_path, change, entry={"payload": CLAIM | {"body": LOAD}}, kept=ONE))
     verdict = found.results.summary.verdict.finding
     assert (found.status, verdict.code, verdict.unknown) == ("caution", "dynamics.marginal", ("friction",))
-    assert "not everything was examined" in say(verdict)
+    assert "loads, ratings or paths are left out" in say(verdict)
     assert Open("friction", ("J4",)) in found.results.summary.assumed
 
 

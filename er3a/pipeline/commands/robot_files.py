@@ -49,17 +49,13 @@ def import_urdf(
     """Write a robot file (D-H table, directions, offsets, limits) from a URDF."""
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
-    from er3a.formats.urdf_tree import srdf_home
     from er3a.robots.robot import robot_name
 
     with shown_work(f"{file}: reading the arm"):
-        imported = read_urdf(file, base=base, tip=tip, snap=snap, xacro=xacro or ())
-    robot = imported.robot
-    if srdf:
-        robot = robot.replace(home=srdf_home(srdf, robot, imported.joints))
+        imported = read_urdf(file, base=base, tip=tip, snap=snap, xacro=xacro or (), srdf=srdf)
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
-    write_robot(robot.replace(name=output.stem), output)
+    write_robot(imported.robot.replace(name=output.stem), output)
     for note in imported.notes:
         options.print_note(note)
     if as_json:

@@ -72,9 +72,12 @@ WHAT_IT_DOES = "what it does, for which see er3a check-program"
 @options.app.command(rich_help_panel=options.FIRST)
 def check(
     files: Annotated[
-        list[Path],
-        typer.Argument(callback=options.given_files, help="robot, study, target, path, scene or reference files"),
-    ],
+        list[Path] | None,
+        typer.Argument(
+            callback=options.given_files,
+            help="robot, study, target, path, scene or reference files (default: the study in this folder)",
+        ),
+    ] = None,
     xacro: options.Xacro = None,
     base: options.Base = None,
     tip: options.Tip = None,
@@ -90,7 +93,7 @@ def check(
     from er3a.pipeline.sarif import WORDS, Reported, sarif_log
 
     found, worst, rules = list[dict[str, object]](), 0, []
-    for file in files:
+    for file in files or [Path()]:
         try:
             with noted_doubts() as doubts:
                 kind = check_file(file, xacro or (), base, tip)
@@ -102,7 +105,7 @@ def check(
             continue
         more: dict[str, object] = {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
         more |= {"not_examined": [WHAT_IT_DOES]} if kind == PROGRAM else {}
-        broken = rules_broken(file, kind)
+        broken = rules_broken(file, kind, xacro or ())
         rules += [Reported(*each) for each in broken]
         named = [{"code": one.finding.code, "line": one.place.line, "text": text} for one, text in broken]
         more |= {"rules": named} if named else {}

@@ -84,7 +84,7 @@ TEXTS = texts(
         "dynamics.fits": "Within all stated limits; highest utilisation: {tightest}.{rest}",
         "dynamics.marginal": (
             "Within the stated limits, but {masses:dynamics.masses}; highest utilisation: {tightest}.[ Not examined: "
-            "{unknown}. The robot's file can state them.]{rest}"
+            "{unknown}. Enter payload and tool_load in the study, drives and wrist_load in the robot's file.]{rest}"
         ),
         "dynamics.overload": "Overload: {beyond} of {compared} comparisons beyond limits; worst: {tightest}.{rest}",
         "dynamics.rest": (
@@ -122,7 +122,7 @@ WORDS.update(
         {
             "dynamics.why": WHY,
             "dynamics.path": {None: "holding still"},
-            "dynamics.masses": {True: "masses are uncertain", False: "not everything was examined"},
+            "dynamics.masses": {True: "masses are uncertain", False: "loads, ratings or paths are left out"},
             "dynamics.massless": {
                 False: "it counts as massless",
                 True: "its joint's torque counts as 0, and forward dynamics has no value",
