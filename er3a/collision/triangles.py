@@ -19,7 +19,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +32,6 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 40 levels deep
-PROBES = 4  # outermost points of a surface, besides one of each shell, that are looked for inside others
 FIRST = 14  # corners, with which the choice of few of a hull begins
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
@@ -92,8 +91,9 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
     faces = same.reshape(-1)[faces]
     corner = np.ascontiguousarray(points[faces])
     number, shell = _shells(faces, len(points))
-    outermost = faces.ravel()[(fibonacci_sphere(PROBES) @ points[faces.ravel()].T).argmax(axis=1)]
-    probe = points[np.r_[faces[np.unique(number, return_index=True)[1], 0], outermost]]
+    along = (points @ (1.0, SLANT_Y, SLANT_Z))[faces].ravel()
+    last = np.lexsort((along, number.repeat(3)))[3 * np.cumsum(np.bincount(number)) - 1]
+    solid = np.where(shell[:, None, None] != 0, corner, np.nan)
     order, middle = np.arange(len(faces)), corner.mean(axis=1)
     size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)[:, None]
     squares = np.einsum("fki,fkj->fij", corner, corner).reshape(-1, 9)
@@ -106,7 +106,7 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
         mean = sums[:, 9:12] / sums[:, 12:]
         about = sums[:, :9].reshape(-1, 3, 3) / sums[:, 12:, None] - 3 * mean[:, :, None] * mean[:, None]
         axes = np.linalg.eigh(about)[1].swapaxes(1, 2)
-        boxes.append(_bounds(corner[order], starts))
+        boxes.append(_bounds(solid[order], starts))
         slim = _bounds(np.einsum("fki,fai->fka", corner[order], np.repeat(axes, sizes, axis=0)), starts)
         slims.append(np.concatenate([slim[:, :1] @ axes, slim[:, 1:], axes], axis=1))
         child = np.stack([np.full(len(starts), -1), order[starts]], axis=1)
@@ -123,13 +123,16 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
         cut = begin + sizes // 2
         starts = np.stack([begin, cut], axis=1).ravel()
         ends = np.stack([cut, begin + sizes], axis=1).ravel()
+    probe, around = points[faces.ravel()[last]], np.empty(len(last), np.int64)
     trees = np.concatenate(boxes), np.concatenate(slims), np.concatenate(children)
-    return TriangleTree(*trees, corner, shell, probe)
+    tree = TriangleTree(*trees, corner, shell, probe)
+    shells_around(trees_of([tree]), probe, around)
+    return replace(tree, probe=probe[(around == 0) | (around == shell[last // 3])])
 
 
 def _bounds(corner: Reals, starts: Integers) -> Reals:
     """Middle and half the edges (n, 2, 3) of boxes around triangles (F, 3, 3), each from one of ``starts`` on."""
-    lower, upper = (bound.reduceat(bound.reduce(corner, axis=1), starts) for bound in (np.minimum, np.maximum))
+    lower, upper = (bound.reduceat(bound.reduce(corner, axis=1), starts) for bound in (np.fmin, np.fmax))
     return np.stack([(lower + upper) / 2, (upper - lower) / 2], axis=1)
 
 
@@ -308,31 +311,27 @@ def _beyond_plane(points: Reals, i: int, first: int, last: int, by: float) -> bo
 
 
 @inner_kernel
-def _inside(trees: Trees, root: int, x: float, y: float, z: float) -> bool:
-    """Whether a point, in a surface's frame, lies in one of its closed shells."""
+def _around(trees: Trees, root: int, x: float, y: float, z: float) -> int:
+    """The key of the closed shells of a surface in which a point, in its frame, lies; 0 for none."""
     box, child = trees.box, trees.child
-    if abs(x - box[root, 0, 0]) > box[root, 1, 0] or abs(y - box[root, 0, 1]) > box[root, 1, 1]:
-        return False
-    if abs(z - box[root, 0, 2]) > box[root, 1, 2]:
-        return False
     stack = np.empty(WAITING, np.int64)
     stack[0], height, odd = root, 1, np.int64(0)
     while height:
         height -= 1
         n = stack[height]
-        if box[n, 0, 0] + box[n, 1, 0] < x:
+        across, half = box[n, 0, 0] - x, box[n, 1, 0]
+        if not (across + half >= 0 and (n != root or across <= half)):
             continue
-        across = box[n, 0, 0] - x
-        if abs(box[n, 0, 1] - y - SLANT_Y * across) > box[n, 1, 1] + SLANT_Y * box[n, 1, 0]:
+        if not abs(box[n, 0, 1] - y - SLANT_Y * across) <= box[n, 1, 1] + SLANT_Y * half:
             continue
-        if abs(box[n, 0, 2] - z - SLANT_Z * across) > box[n, 1, 2] + SLANT_Z * box[n, 1, 0]:
+        if not abs(box[n, 0, 2] - z - SLANT_Z * across) <= box[n, 1, 2] + SLANT_Z * half:
             continue
         if child[n, 0] >= 0:
             stack[height], stack[height + 1] = child[n, 0], child[n, 1]
             height += 2
-        elif trees.shell[child[n, 1]] and _ray_meets(trees.corner[child[n, 1]], x, y, z):
+        elif _ray_meets(trees.corner[child[n, 1]], x, y, z):
             odd ^= trees.shell[child[n, 1]]
-    return bool(odd != 0)
+    return odd
 
 
 @inner_kernel
@@ -371,18 +370,20 @@ def holds_point(trees: Trees, T: Reals, root: int, point: Reals) -> bool:
     x = T[0, 0] * u + T[1, 0] * v + T[2, 0] * w
     y = T[0, 1] * u + T[1, 1] * v + T[2, 1] * w
     z = T[0, 2] * u + T[1, 2] * v + T[2, 2] * w
-    return _inside(trees, root, x, y, z)
+    return bool(_around(trees, root, x, y, z) != 0)
 
 
 @inner_kernel
-def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, probe: Reals) -> bool:
-    """Whether a shell of body b, placed by S (4, 4), has its probe in body a, placed by T (4, 4)."""
+def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, R: Reals, t: Reals) -> bool:
+    """Whether a shell of body b, placed by S (4, 4), has its probe in body a, placed by T (4, 4); R (3, 3) and t (3,)
+    get the frame S as seen from T."""
+    _turned(T, S, R, t)
     for p in range(trees.first[b], trees.last[b]):
-        for r in range(3):
-            probe[r] = S[r, 3]
-            for k in range(3):
-                probe[r] += S[r, k] * trees.probe[p, k]
-        if holds_point(trees, T, trees.root[a], probe):
+        u, v, w = trees.probe[p, 0], trees.probe[p, 1], trees.probe[p, 2]
+        x = R[0, 0] * u + R[0, 1] * v + R[0, 2] * w + t[0]
+        y = R[1, 0] * u + R[1, 1] * v + R[1, 2] * w + t[1]
+        z = R[2, 0] * u + R[2, 1] * v + R[2, 2] * w + t[2]
+        if _around(trees, trees.root[a], x, y, z):
             return True
     return False
 
@@ -423,10 +424,10 @@ def surface_distance(  # noqa: C901, PLR0912
         boxes, nb = np.zeros((1, 5, 3)), 0
         _core_in_frame(T, core, R, points, boxes[0])
     else:
-        within = _holds_probe(trees, T, S, a, b, t) or _holds_probe(trees, S, T, b, a, t)
+        within = _holds_probe(trees, S, T, b, a, R, t)
+        within = _holds_probe(trees, T, S, a, b, R, t) or within
         if within and far <= 0:  # only whether they overlap is asked
             return 0.0
-        _turned(T, S, R, t)
     axis, close, start, other = np.zeros(3), np.empty((2, 3)), int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
     stack, bound = np.empty((WAITING, 2), np.int64), np.empty(WAITING)
     stack[0, 0], stack[0, 1], bound[0] = trees.root[a], nb, 0.0
@@ -517,9 +518,10 @@ def surface_above_plane(
     stack[0], height, at = root, 1, np.zeros(3)
     while height:
         height -= 1
-        n, box = stack[height], trees.box[stack[height]]
+        n, box = stack[height], trees.slim[stack[height]]
         low = u * box[0, 0] + v * box[0, 1] + w * box[0, 2]
-        low -= abs(u) * box[1, 0] + abs(v) * box[1, 1] + abs(w) * box[1, 2]
+        for r in range(3):
+            low -= box[1, r] * abs(u * box[r + 2, 0] + v * box[r + 2, 1] + w * box[r + 2, 2])
         if low >= best:
             continue
         if trees.child[n, 0] >= 0:
@@ -555,3 +557,17 @@ def depths_inside(trees: Trees, points: Reals, found: Reals) -> None:
         found[n] = 0.0
         if holds_point(trees, T, trees.root[0], points[n]):
             found[n] = -surface_distance(trees, 0, T, 1, T, (points, n, n + 1, 0.0), room, near, np.inf)
+
+
+@kernel
+def shells_around(trees: Trees, points: Reals, found: Integers) -> None:
+    """Which of a surface's closed shells points lie in.
+
+    Parameters
+    ----------
+    trees : of the surface alone
+    points : (N, 3), m, in the surface's frame
+    found : (N,), gets the keys of these shells, combined; 0 for points outside all of them
+    """
+    for n in range(len(points)):
+        found[n] = _around(trees, trees.root[0], points[n, 0], points[n, 1], points[n, 2])
