@@ -1,14 +1,17 @@
 """Surfaces of triangles: trees of boxes around them, distances, and what lies inside closed ones, compiled.
 
-A tree halves the triangles of a surface along the longest side of their middles' box, until each box holds one
-triangle. A box lies along the principal axes of what it holds, and so is as thin as that: housings that turn in each
-other are near over a wide area. Two surfaces are measured by descending both trees at once, the nearer boxes first;
-boxes that are farther apart than what was found are left out. The distance of two boxes is bounded from below by the
-box of one that holds the other, in either's axes [1]_. Two triangles are measured as convex cores, and so is a triangle
-with a convex body.
+A tree cuts the box of the triangles' middles in half along its longest side, at least a quarter of them on either side,
+until each box holds one triangle. A box lies along the principal axes of what it holds, and so is as thin as that:
+housings that turn in each other are near over a wide area. Two surfaces are measured by descending both trees at once,
+the nearer boxes first, or those that are deeper in each other; boxes that are farther away than what was found are left
+out. The distance of two boxes is bounded from below by the box of one that holds the other, in either's axes; boxes
+that overlap so are tried along the directions across two of their edges [1]_. Two triangles are measured as convex
+cores, and so is a triangle with a convex body.
 
 A surface may consist of many shells. A point is inside if a ray from it crosses one of the closed shells an odd number
-of times. What does not cross a surface, but has a point of one of its shells inside, is inside as a whole.
+of times. What does not cross a surface, but has a point of one of its shells inside, is inside as a whole. Of a shell
+that point is looked at which is farthest along the ray, unless another closed shell of its body holds it: what holds it
+then crosses that shell, holds it too, or is inside it.
 
 References
 ----------
@@ -19,7 +22,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -27,13 +30,13 @@ import scipy
 
 from er3a.by_value import ByValue
 from er3a.collision.convex import ROOM, TOUCHING, cores_distance
-from er3a.geometry.vectors import fibonacci_sphere
+from er3a.geometry.vectors import Vector, fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
 
-WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 40 levels deep
-PROBES = 4  # outermost points of a surface, besides one of each shell, that are looked for inside others
+WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 96 levels deep at most
 FIRST = 14  # corners, with which the choice of few of a hull begins
+EDGE = 1e-9  # m; gaps along directions across two edges count from here on, as parallel edges give none
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
 
@@ -43,12 +46,13 @@ class TriangleTree(ByValue):
 
     Attributes
     ----------
-    box : (M, 2, 3), m, middle and half the edges of a box along the frame's axes; the first holds all
-    slim : (M, 5, 3), m, the same of a box along the principal axes of what the other holds, and these axes
+    box : (M, 2, 3), m, middle and half the edges of a box along the frame's axes, of closed shells only; NaN for none
+    slim : (M, 5, 3), m, the same of a box along the principal axes of all that it holds, and these axes; the first
+        holds all
     child : (M, 2), the two boxes in a box; of the box of one triangle -1 and the triangle's number
     corner : (F, 3, 3), m
     shell : (F,), a number of the closed shell that a triangle belongs to, 0 for one that is not closed
-    probe : (S, 3), m, points of the surface, of each shell at least one
+    probe : (S, 3), m, a point of each shell that is not inside another one
     """
 
     box: Reals
@@ -92,8 +96,9 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
     faces = same.reshape(-1)[faces]
     corner = np.ascontiguousarray(points[faces])
     number, shell = _shells(faces, len(points))
-    outermost = faces.ravel()[(fibonacci_sphere(PROBES) @ points[faces.ravel()].T).argmax(axis=1)]
-    probe = points[np.r_[faces[np.unique(number, return_index=True)[1], 0], outermost]]
+    along = (points @ (1.0, SLANT_Y, SLANT_Z))[faces].ravel()
+    last = np.lexsort((along, number.repeat(3)))[3 * np.cumsum(np.bincount(number)) - 1]
+    solid = np.where(shell[:, None, None] != 0, corner, np.nan)
     order, middle = np.arange(len(faces)), corner.mean(axis=1)
     size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)[:, None]
     squares = np.einsum("fki,fkj->fij", corner, corner).reshape(-1, 9)
@@ -101,12 +106,12 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
     starts, ends = np.array([0]), np.array([len(faces)])
     boxes, slims, children = list[Reals](), list[Reals](), list[Integers]()
     count = 1
-    while len(starts):
+    while True:
         sums, sizes, open_ = np.add.reduceat(moments[order], starts), ends - starts, ends - starts > 1
         mean = sums[:, 9:12] / sums[:, 12:]
         about = sums[:, :9].reshape(-1, 3, 3) / sums[:, 12:, None] - 3 * mean[:, :, None] * mean[:, None]
         axes = np.linalg.eigh(about)[1].swapaxes(1, 2)
-        boxes.append(_bounds(corner[order], starts))
+        boxes.append(_bounds(solid[order], starts))
         slim = _bounds(np.einsum("fki,fai->fka", corner[order], np.repeat(axes, sizes, axis=0)), starts)
         slims.append(np.concatenate([slim[:, :1] @ axes, slim[:, 1:], axes], axis=1))
         child = np.stack([np.full(len(starts), -1), order[starts]], axis=1)
@@ -116,20 +121,27 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
         order = order[np.repeat(open_, sizes)]  # only what is halved further
         sizes = sizes[open_]
         begin = np.cumsum(sizes) - sizes
-        if len(begin):
-            segment = np.repeat(np.arange(len(sizes)), sizes)
-            spread = np.maximum.reduceat(middle[order], begin) - np.minimum.reduceat(middle[order], begin)
-            order = order[np.lexsort((middle[order, spread.argmax(axis=1)[segment]], segment))]
-        cut = begin + sizes // 2
+        if not len(begin):
+            break
+        segment = np.repeat(np.arange(len(sizes)), sizes)
+        span = _bounds(middle[order, None], begin)
+        side = span[:, 1].argmax(axis=1)[segment]
+        along = middle[order, side] - span[segment, 0, side]
+        order = order[np.lexsort((along, segment))]
+        least = (sizes + 3) // 4
+        cut = begin + np.clip(np.add.reduceat(along < 0, begin), least, sizes - least)
         starts = np.stack([begin, cut], axis=1).ravel()
         ends = np.stack([cut, begin + sizes], axis=1).ravel()
+    probe, around = points[faces.ravel()[last]], np.empty(len(last), np.int64)
     trees = np.concatenate(boxes), np.concatenate(slims), np.concatenate(children)
-    return TriangleTree(*trees, corner, shell, probe)
+    tree = TriangleTree(*trees, corner, shell, probe)
+    shells_around(trees_of([tree]), probe, around)
+    return replace(tree, probe=probe[(around == 0) | (around == shell[last // 3])])
 
 
 def _bounds(corner: Reals, starts: Integers) -> Reals:
     """Middle and half the edges (n, 2, 3) of boxes around triangles (F, 3, 3), each from one of ``starts`` on."""
-    lower, upper = (bound.reduceat(bound.reduce(corner, axis=1), starts) for bound in (np.minimum, np.maximum))
+    lower, upper = (bound.reduceat(bound.reduce(corner, axis=1), starts) for bound in (np.fmin, np.fmax))
     return np.stack([(lower + upper) / 2, (upper - lower) / 2], axis=1)
 
 
@@ -221,51 +233,79 @@ def trees_of(trees: Sequence[TriangleTree | None]) -> Trees:
 
 
 @inner_kernel
-def _turned(T: Reals, S: Reals, R: Reals, t: Reals) -> None:
-    """The frame S (4, 4) as seen from the frame T (4, 4): R (3, 3) and t (3,)."""
+def _frame_seen(T: Reals, S: Reals, M: Reals) -> None:
+    """The frame S (4, 4) as seen from the frame T (4, 4), into M (3, 4)."""
     for r in range(3):
-        t[r] = 0.0
-        for k in range(3):
-            t[r] += T[k, r] * (S[k, 3] - T[k, 3])
-        for c in range(3):
-            R[r, c] = T[0, r] * S[0, c] + T[1, r] * S[1, c] + T[2, r] * S[2, c]
+        for c in range(4):
+            M[r, c] = 0.0
+            for k in range(3):
+                M[r, c] += T[k, r] * (S[k, c] - T[k, 3] if c == 3 else S[k, c])
 
 
 @inlined_kernel
-def _boxes_apart(first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals, limit: float) -> float:
-    """A lower bound of the squared distance of a box of ``first`` (M, 5, 3) and one of ``second``, seen from the first
-    by R (3, 3) and t (3,); one that reaches ``limit`` will do."""
-    x, y, z = second[m, 0, 0], second[m, 0, 1], second[m, 0, 2]
-    dx = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + t[0] - first[n, 0, 0]
-    dy = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + t[1] - first[n, 0, 1]
-    dz = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + t[2] - first[n, 0, 2]
-    a, b, c = _turned_axis(second, m, 2, R)
-    d, e, f = _turned_axis(second, m, 3, R)
-    g, h, o = _turned_axis(second, m, 4, R)
-    i, j, k = second[m, 1, 0], second[m, 1, 1], second[m, 1, 2]
-    apart = reach_i = reach_j = reach_k = 0.0
-    for r in range(3):
-        x, y, z, half = first[n, r + 2, 0], first[n, r + 2, 1], first[n, r + 2, 2], first[n, 1, r]
-        u, v, w = abs(x * a + y * b + z * c), abs(x * d + y * e + z * f), abs(x * g + y * h + z * o)
-        apart += max(abs(x * dx + y * dy + z * dz) - half - u * i - v * j - w * k, 0.0) ** 2
-        if apart >= limit:
-            return float(apart)
-        reach_i, reach_j, reach_k = reach_i + u * half, reach_j + v * half, reach_k + w * half
-    other = max(abs(a * dx + b * dy + c * dz) - i - reach_i, 0.0) ** 2
-    other += max(abs(d * dx + e * dy + f * dz) - j - reach_j, 0.0) ** 2
-    other += max(abs(g * dx + h * dy + o * dz) - k - reach_k, 0.0) ** 2
-    return float(max(apart, other))
-
-
-@inlined_kernel
-def _turned_axis(boxes: Reals, n: int, row: int, R: Reals) -> tuple[float, float, float]:
-    """An axis of a box of (M, 5, 3), turned by R (3, 3)."""
-    x, y, z = boxes[n, row, 0], boxes[n, row, 1], boxes[n, row, 2]
+def _moved(M: Reals, points: Reals, n: int) -> Vector:
+    """A point of (N, 3) as M (3, 4) places it."""
+    x, y, z = points[n, 0], points[n, 1], points[n, 2]
     return (
-        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
-        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
-        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+        M[0, 0] * x + M[0, 1] * y + M[0, 2] * z + M[0, 3],
+        M[1, 0] * x + M[1, 1] * y + M[1, 2] * z + M[1, 3],
+        M[2, 0] * x + M[2, 1] * y + M[2, 2] * z + M[2, 3],
     )
+
+
+@inner_kernel
+def _box_seen(boxes: Reals, n: int, M: Reals, seen: Reals) -> None:
+    """A box of (M, 5, 3) as M (3, 4) places it, into (5, 3)."""
+    for r in range(3):
+        for k in range(5):
+            seen[k, r] = M[r, 0] * boxes[n, k, 0] + M[r, 1] * boxes[n, k, 1] + M[r, 2] * boxes[n, k, 2]
+        seen[0, r] += M[r, 3]
+        seen[1, r] = boxes[n, 1, r]
+
+
+@inlined_kernel
+def _boxes_apart(boxes: Reals, n: int, other: Reals, turn: Reals, limit: float) -> float:
+    """A lower bound of the squared distance of a box of (M, 5, 3) and another one (5, 3) in the same frame, or below 0
+    by how far both are in each other; one that reaches ``limit`` will do. ``turn`` (4, 3) is scratch memory."""
+    least, apart, beyond = -np.inf, 0.0, 0.0
+    u, v, w = other[0, 0] - boxes[n, 0, 0], other[0, 1] - boxes[n, 0, 1], other[0, 2] - boxes[n, 0, 2]
+    for r in range(3):
+        x, y, z, gap = boxes[n, r + 2, 0], boxes[n, r + 2, 1], boxes[n, r + 2, 2], -boxes[n, 1, r]
+        for c in range(3):
+            cosine = x * other[c + 2, 0] + y * other[c + 2, 1] + z * other[c + 2, 2]
+            gap -= abs(cosine) * other[1, c]
+            turn[r, c] = cosine
+        along = x * u + y * v + z * w
+        gap += abs(along)
+        turn[3, r] = along
+        least, apart = max(least, gap), apart + max(gap, 0.0) ** 2
+    if apart >= limit:
+        return apart
+    for c in range(3):
+        gap, along = -other[1, c], 0.0
+        for r in range(3):
+            along += turn[3, r] * turn[r, c]
+            gap -= abs(turn[r, c]) * boxes[n, 1, r]
+        gap += abs(along)
+        least, beyond = max(least, gap), beyond + max(gap, 0.0) ** 2
+    if least > 0:
+        return max(apart, beyond)
+    for r in range(3):
+        i, j = (r + 1) % 3, (r + 2) % 3
+        for c in range(3):
+            k, o = (c + 1) % 3, (c + 2) % 3
+            gap = abs(turn[3, j] * turn[i, c] - turn[3, i] * turn[j, c])
+            gap -= boxes[n, 1, i] * abs(turn[j, c]) + boxes[n, 1, j] * abs(turn[i, c])
+            gap -= other[1, k] * abs(turn[r, o]) + other[1, o] * abs(turn[r, k])
+            if gap > EDGE:
+                return float(gap * gap)
+    return least
+
+
+@inlined_kernel
+def _side(boxes: Reals, n: int) -> float:
+    """A quarter of the area of the largest side of a box of (M, 5, 3)."""
+    return float(boxes[n, 1, 1] * boxes[n, 1, 2])
 
 
 @inlined_kernel
@@ -308,31 +348,27 @@ def _beyond_plane(points: Reals, i: int, first: int, last: int, by: float) -> bo
 
 
 @inner_kernel
-def _inside(trees: Trees, root: int, x: float, y: float, z: float) -> bool:
-    """Whether a point, in a surface's frame, lies in one of its closed shells."""
-    box, child = trees.box, trees.child
-    if abs(x - box[root, 0, 0]) > box[root, 1, 0] or abs(y - box[root, 0, 1]) > box[root, 1, 1]:
-        return False
-    if abs(z - box[root, 0, 2]) > box[root, 1, 2]:
-        return False
+def _around(trees: Trees, root: int, point: Vector) -> np.int64:
+    """The key of a surface's closed shells in which a point lies, in its frame; 0 for none."""
+    box, child, (x, y, z) = trees.box, trees.child, point
     stack = np.empty(WAITING, np.int64)
     stack[0], height, odd = root, 1, np.int64(0)
     while height:
         height -= 1
         n = stack[height]
-        if box[n, 0, 0] + box[n, 1, 0] < x:
+        across, half = box[n, 0, 0] - x, box[n, 1, 0]
+        if not (across + half >= 0 and (n != root or across <= half)):  # boxes of open shells are NaN
             continue
-        across = box[n, 0, 0] - x
-        if abs(box[n, 0, 1] - y - SLANT_Y * across) > box[n, 1, 1] + SLANT_Y * box[n, 1, 0]:
+        if not abs(box[n, 0, 1] - y - SLANT_Y * across) <= box[n, 1, 1] + SLANT_Y * half:
             continue
-        if abs(box[n, 0, 2] - z - SLANT_Z * across) > box[n, 1, 2] + SLANT_Z * box[n, 1, 0]:
+        if not abs(box[n, 0, 2] - z - SLANT_Z * across) <= box[n, 1, 2] + SLANT_Z * half:
             continue
         if child[n, 0] >= 0:
             stack[height], stack[height + 1] = child[n, 0], child[n, 1]
             height += 2
-        elif trees.shell[child[n, 1]] and _ray_meets(trees.corner[child[n, 1]], x, y, z):
+        elif _ray_meets(trees.corner[child[n, 1]], x, y, z):
             odd ^= trees.shell[child[n, 1]]
-    return bool(odd != 0)
+    return odd
 
 
 @inner_kernel
@@ -354,35 +390,13 @@ def _ray_meets(corner: Reals, x: float, y: float, z: float) -> bool:
 
 
 @inner_kernel
-def holds_point(trees: Trees, T: Reals, root: int, point: Reals) -> bool:
-    """Whether a surface holds a point in one of its closed shells.
-
-    Parameters
-    ----------
-    T : (4, 4), m, places the surface
-    root : first box of its tree
-    point : (3,), m, in the frame in which T places it
-
-    Returns
-    -------
-    inside : False for open shells
-    """
-    u, v, w = point[0] - T[0, 3], point[1] - T[1, 3], point[2] - T[2, 3]
-    x = T[0, 0] * u + T[1, 0] * v + T[2, 0] * w
-    y = T[0, 1] * u + T[1, 1] * v + T[2, 1] * w
-    z = T[0, 2] * u + T[1, 2] * v + T[2, 2] * w
-    return _inside(trees, root, x, y, z)
-
-
-@inner_kernel
-def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, probe: Reals) -> bool:
-    """Whether a shell of body b, placed by S (4, 4), has its probe in body a, placed by T (4, 4)."""
+def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, M: Reals) -> bool:
+    """Whether a shell of body b, placed by S (4, 4), has its probe in body a, placed by T (4, 4); M (3, 4) gets the
+    frame S as seen from T."""
+    _frame_seen(T, S, M)
     for p in range(trees.first[b], trees.last[b]):
-        for r in range(3):
-            probe[r] = S[r, 3]
-            for k in range(3):
-                probe[r] += S[r, k] * trees.probe[p, k]
-        if holds_point(trees, T, trees.root[a], probe):
+        point = _moved(M, trees.probe, p)
+        if _around(trees, trees.root[a], point):
             return True
     return False
 
@@ -414,34 +428,37 @@ def surface_distance(  # noqa: C901, PLR0912
     -------
     distance : m; below 0 where one is inside the other, 0 where they cross
     """
-    w, first, last, disc = core
-    convex = trees.root[b] < 0
-    count, disc = (last - first, disc) if convex else (3, 0.0)
-    points, R, t, boxes, nb = np.empty((3 + count, 3)), np.zeros((3, 3)), np.zeros(3), trees.slim, trees.root[b]
-    within = False
+    _, first, last, disc = core
+    boxes, nb, convex = trees.slim, trees.root[b], trees.root[b] < 0
+    count = last - first if convex else 3
+    points, M, back = np.empty((3 + count, 3)), np.eye(3, 4), np.empty((3, 4))
+    stack, bound, seen, turn = np.empty((WAITING, 2), np.int64), np.empty(WAITING), np.empty((5, 3)), np.empty((4, 3))
     if convex:
         boxes, nb = np.zeros((1, 5, 3)), 0
-        _core_in_frame(T, core, R, points, boxes[0])
+        _core_in_frame(T, core, points, boxes[0])
+        within = _around(trees, trees.root[a], _moved(M, points, 3)) != 0
     else:
-        within = _holds_probe(trees, T, S, a, b, t) or _holds_probe(trees, S, T, b, a, t)
-        if within and far <= 0:  # only whether they overlap is asked
-            return 0.0
-        _turned(T, S, R, t)
+        within = _holds_probe(trees, S, T, b, a, back)
+        within = _holds_probe(trees, T, S, a, b, M) or within
+    if within and far <= 0:  # only whether they overlap is asked
+        return 0.0
     axis, close, start, other = np.zeros(3), np.empty((2, 3)), int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
-    stack, bound = np.empty((WAITING, 2), np.int64), np.empty(WAITING)
-    stack[0, 0], stack[0, 1], bound[0] = trees.root[a], nb, 0.0
-    height, best = 1, max(far, 2 * TOUCHING)
+    stack[0, 0], stack[0, 1], bound[0], height, best = trees.root[a], nb, 0.0, 1, max(far, 2 * TOUCHING)
     while height:
         height -= 1
         n, m, kept = stack[height, 0], stack[height, 1], height
         if bound[height] >= best * best:
             continue
         deep_a, deep_b = trees.child[n, 0] >= 0, not convex and trees.child[m, 0] >= 0
-        if deep_a or deep_b:  # the longer one is opened
-            of_a = deep_a and not (deep_b and boxes[m, 1, 2] >= trees.slim[n, 1, 2])
+        if deep_a or deep_b:  # the one with the larger side is opened
+            of_a = deep_a and not (deep_b and _side(boxes, m) >= _side(trees.slim, n))
+            if of_a:
+                _box_seen(boxes, m, M, seen)
+            else:
+                _box_seen(trees.slim, n, back, seen)
             for side in range(2):
                 one, two = (trees.child[n, side], m) if of_a else (n, trees.child[m, side])
-                apart = _boxes_apart(trees.slim, one, boxes, two, R, t, best * best)
+                apart = _boxes_apart(trees.slim, one if of_a else two, seen, turn, best * best)
                 if apart < best * best:
                     stack[height, 0], stack[height, 1], bound[height] = one, two, apart
                     height += 1
@@ -453,9 +470,8 @@ def surface_distance(  # noqa: C901, PLR0912
         for k in range(3):
             for r in range(3):
                 points[k, r] = trees.corner[trees.child[n, 1], k, r]
-                if not convex:
-                    c = trees.corner[trees.child[m, 1], k]
-                    points[3 + k, r] = R[r, 0] * c[0] + R[r, 1] * c[1] + R[r, 2] * c[2] + t[r]
+            if not convex:
+                points[3 + k, 0], points[3 + k, 1], points[3 + k, 2] = _moved(M, trees.corner[trees.child[m, 1]], k)
         if _apart_along(points, count, axis) - disc >= best or _beyond_plane(points, 0, 3, 3 + count, disc + best):
             continue
         if not convex and _beyond_plane(points, 3, 0, 3, best):
@@ -465,22 +481,18 @@ def surface_distance(  # noqa: C901, PLR0912
         if distance < best:
             best = distance
             for k in range(2):
-                for r in range(3):
-                    near[k, r] = T[r, 0] * close[k, 0] + T[r, 1] * close[k, 1] + T[r, 2] * close[k, 2] + T[r, 3]
+                near[k, 0], near[k, 1], near[k, 2] = _moved(T, close, k)
         if best <= TOUCHING:
             return 0.0
-    if convex:
-        return -best if holds_point(trees, T, trees.root[a], w[first]) else best
     return -best if within else best
 
 
 @inner_kernel
-def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], R: Reals, points: Reals, box: Reals) -> None:
-    """The points of a core in a surface's frame, from row 3 of ``points`` on, and the box (5, 3) around it; R becomes
-    the identity."""
+def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], points: Reals, box: Reals) -> None:
+    """The points of a core in a surface's frame, from row 3 of ``points`` on, and the box (5, 3) around it."""
     w, first, last, disc = core
     for r in range(3):
-        R[r, r], low, high = 1.0, np.inf, -np.inf
+        low, high = np.inf, -np.inf
         for p in range(last - first):
             value = 0.0
             for k in range(3):
@@ -514,12 +526,13 @@ def surface_above_plane(
     w = x * T[0, 2] + y * T[1, 2] + z * T[2, 2]
     shift = x * T[0, 3] + y * T[1, 3] + z * T[2, 3] - offset
     stack, best = np.empty(WAITING, np.int64), np.inf
-    stack[0], height, at = root, 1, np.zeros(3)
+    stack[0], height = root, 1
     while height:
         height -= 1
-        n, box = stack[height], trees.box[stack[height]]
+        n, box = stack[height], trees.slim[stack[height]]
         low = u * box[0, 0] + v * box[0, 1] + w * box[0, 2]
-        low -= abs(u) * box[1, 0] + abs(v) * box[1, 1] + abs(w) * box[1, 2]
+        for r in range(3):
+            low -= box[1, r] * abs(u * box[r + 2, 0] + v * box[r + 2, 1] + w * box[r + 2, 2])
         if low >= best:
             continue
         if trees.child[n, 0] >= 0:
@@ -531,11 +544,9 @@ def surface_above_plane(
             value = u * corner[0] + v * corner[1] + w * corner[2]
             if value < best:
                 best = value
-                for r in range(3):
-                    at[r] = corner[r]
+                near[0, 0], near[0, 1], near[0, 2] = _moved(T, trees.corner[trees.child[n, 1]], k)
     above = best + shift
     for r in range(3):
-        near[0, r] = T[r, 0] * at[0] + T[r, 1] * at[1] + T[r, 2] * at[2] + T[r, 3]
         near[1, r] = near[0, r] - above * normal[r]
     return float(above)
 
@@ -553,5 +564,19 @@ def depths_inside(trees: Trees, points: Reals, found: Reals) -> None:
     T, room, near = np.eye(4), np.empty((ROOM, 3)), np.empty((2, 3))
     for n in range(len(points)):
         found[n] = 0.0
-        if holds_point(trees, T, trees.root[0], points[n]):
+        if _around(trees, trees.root[0], _moved(T, points, n)):
             found[n] = -surface_distance(trees, 0, T, 1, T, (points, n, n + 1, 0.0), room, near, np.inf)
+
+
+@kernel
+def shells_around(trees: Trees, points: Reals, found: Integers) -> None:
+    """Which of a surface's closed shells points lie in.
+
+    Parameters
+    ----------
+    trees : of the surface alone
+    points : (N, 3), m, in the surface's frame
+    found : (N,), gets the keys of these shells, combined; 0 for points outside all of them
+    """
+    for n in range(len(points)):
+        found[n] = _around(trees, trees.root[0], (points[n, 0], points[n, 1], points[n, 2]))
