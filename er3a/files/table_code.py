@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NoReturn
 
 from er3a.errors import InputError
-from er3a.files.arithmetic import words_of
+from er3a.files.arithmetic import amount_of, words_of
 from er3a.files.code_brackets import CodeGroup, groups_of, parts
 from er3a.files.table_cells import Grid
 from er3a.files.table_headings import heading_of, quantities_of
@@ -153,29 +153,35 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), _listed(code)) if grid]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
-    links, runs = _calls(code)
+    (links, taken), (loose, elements) = _calls(code)
     links = links or _records(code)
     named = [grid for grid in matrices if grid[0][1]]
-    found = links or named or _vectors(code)
-    _check_runs(code, runs, found)
-    if found and not links:
+    found = links or named or _of_lists(_named_lists(code)) or _of_lists(_numbered(code))
+    if not found:
+        found, taken = loose, elements
+    if found and (taken or not links):
         for group in code.groups:
-            _check_kept(code, group, bool(named))
-        if moved := re.search(_TURNED, code.text):
-            code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
+            _check_kept(code, group, bool(named or taken), taken)
+    if found and not links and (moved := re.search(_TURNED, code.text)):
+        code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
     return found
 
 
 _CONSTANT = {"a", "alpha", "d", "offset"}
 
 
-def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
-    """Refuse a matrix, or the list of a column, that its program changes."""
+def _name_of(group: CodeGroup) -> str:
+    """The name that a list gets."""
     found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*[\[{(\s]*$", group.before)
-    name = found[1] if found else ""
+    return found[1] if found else ""
+
+
+def _check_kept(code: Code, group: CodeGroup, is_matrix: bool, taken: Collection[str]) -> None:
+    """Refuse a matrix, or the list of a column, that its program changes."""
+    name = _name_of(group)
     table = _matrix(code, group) if is_matrix else []
     of_column = not is_matrix and _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
-    if not (table or of_column) or not group.inside.strip():
+    if (name not in taken if taken else not (table or of_column)) or not group.inside.strip():
         return
     used = {*re.findall(rf"\b{name}[\[(]\d+,\s*:", code.text)}
     if is_matrix and 0 < len(used) < len(_rows(code, group)):
@@ -215,54 +221,57 @@ _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)
 # Calls and records ----------------------------------------------------------------------------------------------------
 
 
-def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
+def _calls(code: Code) -> tuple[tuple[list[Grid], dict[str, set[str]]], ...]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row, and records
-    ``{"a": 0, "alpha": 90, ...}``; then the calls of a toolbox that take a link from lists."""
-    rows, unread, runs = list[_Link](), list[CodeGroup](), list[CodeGroup]()
-    records = 0
+    ``{"a": 0, "alpha": 90, ...}``, with the lists of which they take elements; then such calls of other functions."""
+    rows, own, unread, records = list[_Link](), list[_Link](), list[CodeGroup](), list[_Link]()
+    lists, loose = Lists(code), Lists(code)
     for each in code.groups:
         if each.bracket == "{" and _is_row(cells := _record(each)):
-            rows.append(_Link("", each.start, cells))
-            records += 1
+            records.append(_Link("", each.start, cells))
             continue
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
         target, function = named.groups()
         order, toolbox = code.orders.get(function, []), _TOOLBOX.fullmatch(function)
-        cells = _arguments(function, each.inside) or _of_signature(order, each.inside)
-        plainly = not {"direction", "prismatic"} & {*cells, *cells.values()}
-        if cells and plainly and (toolbox or function == "DH") and _from_lists(code, cells):
-            _check_taken(code, each, cells)
-            runs.append(each)
-        elif cells and (toolbox or _says_numbers(code, cells)):
-            target = re.sub(r"\s", "", target or "")
-            if target.isidentifier() and "type" not in cells:
-                target = ""
-            added = re.search(
-                r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", each.before, re.S
-            )
-            if added:
-                target = f"{added[1]}[{each.start}"
-            rows.append(_Link(target, each.start, cells))
-        elif toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
+        of_lists = toolbox or function == "DH"
+        texts = (lists if of_lists else loose).written_out(each) if of_lists or order else [each.inside]
+        if of_lists and not texts:
+            code.refuse(each.start, each.inside, *_OF_LOOP)
+        made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
+        made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells))]
+        target = re.sub(r"\s", "", target or "")
+        if target.isidentifier() and ("type" not in (made or [{}])[0] or len(texts) > 1):
+            target = ""
+        added = re.search(r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", each.before, re.S)
+        if added:
+            target = f"{added[1]}[{each.start}"
+        for k, cells in enumerate(made):
+            name = f"{target}.{k}" if target and len(made) > 1 else target
+            (rows if of_lists or texts == [each.inside] else own).append(_Link(name, each.start, cells))
+        if toolbox and not (made or order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
             unread.append(each)
     if "Frame::DH(" in code.text:
-        _segments(code, rows, runs)
+        _segments(code, rows)
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
         code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
     _assigned(code, rows)
-    if len(rows) > records and (re.search(_ADDED, code.text) or len(rows) == 1 or runs):
+    if rows and (re.search(_ADDED, code.text) or len(rows) == 1):
         code.refuse(rows[0].place, ", ".join(_constants(rows[0].cells)), *_OF_LOOP)
+    lists.check_left_out(rows)
+    if not lists.taken:
+        rows = sorted(rows + records, key=lambda row: row.place)
     names = {row.name: row for row in rows}
     chosen = [row_cells(each.inside) for each in code.groups if each.bracket == "["]
     arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
-    taken = [row for each in arms for row in each]
+    chosen_rows = [row for each in arms for row in each]
     several = [each for each in held if len(each) > 1] or [rows]
     held = [each for one in several for each in _begun_again(one)]
-    arms += [each for each in held if not taken or (_list_of(each[0]) and each[0] not in taken)]
-    return [_grid([(code.line(row.place), row.cells) for row in each]) for each in arms], runs
+    arms += [each for each in held if not chosen_rows or (_list_of(each[0]) and each[0] not in chosen_rows)]
+    grids = [_grid([(code.line(row.place), row.cells) for row in each]) for each in (*arms, own)]
+    return (grids[:-1], lists.taken), (grids[-1:] if len(own) > 1 else [], loose.taken)
 
 
 _OF_LOOP = ("is of a loop, or of another program", "Write a row for each joint")
@@ -278,92 +287,156 @@ def _record(group: CodeGroup) -> dict[str, str]:
     return ({"joint": label[1]} if label else {}) | cells
 
 
-_BOUND = re.compile(r"\bfor\b\s*\(?\s*(?:\w+\s+)*?([\w, ()]+?)\s*(?:\bin\b|=|:)")
-_ELEMENT = re.compile(
-    r"(?:[\w.]+\[[\"']|(?:\w+\.)*)(\w+)(?:[\"']\])?\s*[\[(]\s*(\w+)\s*(?:,[\s\d:]+|\]\s*\[\s*\d+\s*)?[\])]"
+_LOOP = re.compile(r"\bfor\b\s*\(?\s*(?:\w+\s+)*?([\w, ()]+?)\s*(?:\bin\b|=|:)\s*([^\n]*)")
+_INDEX = re.compile(r"@\d+|[\[({][^\[\](){}]*[\])}]|\.\w+")
+_REFERENCE = re.compile(rf"(?<![\w.'\"@])(?:self\.)?([^\W\d]\w*)((?:{_INDEX.pattern})+)")
+_PART = re.compile(
+    r"(?m)^[ \t]*\(?(\w+(?:[ \t]*,[ \t]*\w+)*)\)?[ \t]*=(?!=)[ \t]*"
+    r"([\w.]+(?:\[[^\]\n]*\]|\([^()\n]*\))*)[ \t]*;?[ \t]*$"
 )
+_LENGTH = re.compile(
+    r"(?:len|size|length|numel|height)\(\s*(?:self\.)?(\w+)\b(?:[^()]|\([^()]*\))*\)|(\w+)\.shape\[0\]"
+)
+_RANGE = re.compile(r"range\((?:(\d+), *)?(\w+)\)|(\d+)[ ]*:[ ]*(\w+)|(\d+);[^;<]*<(=?)[ ]*(\w+);.*")
+_COUNT = re.compile(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?[ \t]*$")
+Value = str | list["Value"] | dict[str, "Value"]
 
 
-def _from_lists(code: Code, cells: dict[str, str]) -> bool:
-    """Whether a link takes its numbers from lists: by the variable of a loop, or all by one number."""
-    bound = " ".join([*_BOUND.findall(code.text), *_UNPACKED.findall(code.text)])
-    texts = [cell for cell in _constants(cells) if not re.fullmatch(r"[-+.\d]*", cell)]
-    used = {*re.findall(r"[^\W\d]\w*", " ".join(texts))} & {*re.findall(r"[^\W\d]\w*", bound)}
-    found = [_ELEMENT.fullmatch(text) for text in texts]
-    numbers = {each[2] for each in found if each}
-    return bool(used) or (len(numbers) == 1 and all(found) and ("row" in cells or len(found) > 1))
+class Lists:
+    """The lists, matrices and lists of records of a program by their names, and which parts of them links take."""
+
+    def __init__(self, code: Code):
+        self.code, self.taken, self.loops = code, dict[str, set[str]](), list[str]()
+        self.values = dict[str, list[Value]]()
+        self.from_one = re.search(r"(?m)^\s*end\b", code.text) is not None  # of MATLAB or Julia
+        for name, cells, _, _ in _named_lists(code):
+            if cells and ("Frame::DH(" in code.text or quantities_of([name]) != ["theta"]):  # values of joints
+                self.values[name] = [*cells]
+        for group in code.groups:
+            inner = [_record(each) for each in code.groups if group.start < each.start < group.end]
+            rows = [row for _, row in _rows(code, group)]
+            if len(rows) > 1:
+                self.values.setdefault(_name_of(group), [*filter(_is_row, inner)] or [*rows])
+
+    def written_out(self, call: CodeGroup) -> list[str]:
+        """The arguments of a call as often as it is carried out, with the elements of lists in place of their names."""
+        text, code = call.inside, self.code.text
+        around = [each for each in self.code.groups if each.start < call.start < call.end < each.end]
+        built = [found for each in around if (found := _LOOP.search(code, call.end, each.end))]
+        passes = [text]
+        for loop in (built or [*_LOOP.finditer(code, 0, call.start)])[-1:]:
+            body, target, over = code[loop.end() : call.start], loop[1], loop[2].strip(" :{")
+            named = {name: f"{value}{at}" for names, value in _PART.findall(body) for name, at in _counted(names)}
+            filled = _filled(text, named)
+            outside = not built and re.search(r"\b(?:def|function)\b", body)
+            if built or (not outside and {*re.findall(r"\w+", target)} & {*re.findall(r"\w+", filled)}):
+                numbers = [] if re.search(r"\bif\b", f"{body} {over}") else self._numbers(filled, over)
+                over = over if {*re.findall(r"\w+", over)} & {*self.values} else ""  # a number
+                passes = [_filled(filled, _bound(target, over, k)) for k in numbers]
+                self.loops += {each[1] for each in _REFERENCE.finditer("".join(passes[:1])) if each[1] in self.values}
+        # An element may be a sum of elements.
+        return [_REFERENCE.sub(self._element, _REFERENCE.sub(self._element, each)) for each in passes]
+
+    def check_left_out(self, rows: list[_Link]) -> None:
+        """Refuse links that take no offsets although their lists have some, and lists that two loops go through."""
+        given = {row.cells.get(name, "") for row in rows for name in ("offset", "theta")} - {"", "0"}
+        if rows and len({*self.loops}) < len(self.loops):
+            self.code.refuse(rows[0].place, self.loops[0], *_OF_LOOP)
+        for name, value in self.values.items() if rows and not given else ():
+            used, cells = self.taken.get(name, set()), list[tuple[object, object]]()
+            for row in value:
+                if isinstance(row, str):
+                    cells += [(name, row)] if not used and len(value) == len(rows) else []
+                elif used and ":" not in used:
+                    cells += row.items() if isinstance(row, dict) else enumerate(row)
+            for key, cell in cells:
+                own = isinstance(key, int) or _place(str(key).rpartition("_")[2]) == "theta"
+                if own and str(key) not in used and re.search(r"[1-9]|pi|π", str(cell)):
+                    self.code.refuse(rows[0].place, name, "may have offsets, which no link takes", _OF_LOOP[1])
+
+    def _numbers(self, text: str, over: str) -> Iterable[int]:
+        """The numbers of a loop's passes; all of the lists that a call takes if an unknown name says how many."""
+        counts = {name: str(len(value)) for name, value in self.values.items()}
+        known = dict(_COUNT.findall(self.code.text))
+        bounds = _LENGTH.sub(lambda found: counts.get(found[1] or found[2], "n"), over)
+        ranged = _RANGE.fullmatch(re.sub(r"[^\W\d]\w*", lambda found: known.get(found[0], found[0]), bounds))
+        names = [name for name in re.findall(r"\w+", "" if ranged else over) if name in counts]
+        names = names or [name for name in re.findall(r"\w+", text) if name in counts]
+        every = min((int(counts[name]) for name in names), default=0)
+        if ranged is None:
+            return range(every if re.match(r"enumerate\(|zip\(|[\w.]+$", over) else 0)
+        first, last = int(ranged[1] or ranged[3] or ranged[5] or 0), ranged[2] or ranged[4] or ranged[7]
+        return range(first, int(last) + bool(ranged[3] or ranged[6]) if last.isdigit() else first + every)
+
+    def _element(self, found: re.Match[str]) -> str:
+        """An element of a list, or a row of a matrix; what is no list stays as it is."""
+        name, indices = found.groups()
+        value: Value = self.values.get(name, "")
+        key = ""
+        try:
+            for index in _INDEX.findall(indices):
+                for part in parts(index[1:-1]) if index[0] in "[({" else [index]:
+                    key = part.strip("'\"@.").lower()
+                    if isinstance(value, dict):
+                        value = value[key]
+                    elif key != ":":
+                        key = str(
+                            int(amount_of(key).number) - (index[0] in "({" or (index[0] == "[" and self.from_one))
+                        )
+                        value = value[int(key)] if int(key) >= 0 else ""
+        except (KeyError, IndexError, ValueError):
+            value = ""
+        if not value:
+            return found[0]
+        self.taken.setdefault(name, set()).add(key)
+        if isinstance(value, str):
+            return f"({value})" if re.search(r"[-+*/]", value) else value
+        self.taken[name].add(":")
+        row = ", ".join(map(str, value))
+        return row if found.string[: found.start()].rstrip()[-1:] in ("[", "*") else f"[{row}]"
 
 
-_TAKEN = re.compile(r"(?:(?:\w+\.)*(?:deg2rad|radians)\()?([^\W\d][\w.]*(?:\s*[\[(][\w:,\"' ]*[\])])*(?:\.\w+)?)\)?")
+def _filled(text: str, given: dict[str, str]) -> str:
+    """A text with what names stand for in place of them."""
+    pattern = rf"(?<![\w.'\"@])(?:{'|'.join(given) or '(?!)'})\b(?![('\"]|\s*=(?!=))"
+    return re.sub(pattern, lambda found: given[found[0]], text)
 
 
-def _check_taken(code: Code, call: CodeGroup, cells: dict[str, str]) -> None:
-    """Refuse a link that works out its numbers, or takes one for another: ``d=-p["a"]``."""
-    lists = _zipped(code)
-    for name, cell in cells.items():
-        if name in ("row", "type", "convention", "theta") or cell.strip("0.") == "":
-            continue
-        taken = _TAKEN.fullmatch(cell)
-        words = re.findall(r"[^\W\d]\w*", taken[1]) if taken else [""]
-        own = taken and (_ELEMENT.fullmatch(taken[1]) or words[-1] in lists)
-        if not own and [_place(each) for each in words[-1:] if heading_of(each)] != [_place(name)]:
-            code.refuse(call.start, cell, *_OF_LOOP)
+def _counted(names: str) -> list[tuple[str, str]]:
+    """Each of several names with its number, one alone without any."""
+    found = re.findall(r"\w+", names)
+    return [(name, f"@{k}" if len(found) > 1 else "") for k, name in enumerate(found)]
 
 
-def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
-    """Refuse links from lists unless a loop, or one call after the other, goes through all rows of the one table."""
-    if not runs or len(grids) > 1:
-        return
-    rows = len(grids[0]) - 1 if grids else 0
-    used = [int(number) for each in runs for _, number in _ELEMENT.findall(each.inside)[-1:] if number.isdigit()]
-    one_by_one = used in (list(range(rows)), list(range(1, rows + 1))) and len(runs) == rows
-    given = {name for name, part in _given_to(code, toolbox=True) if part != "0"}
-    turns = (
-        cell
-        for (_, header), *body in grids
-        for _, cells in body
-        for name, cell in zip(header, cells)
-        if _place(name) == "theta"
-    )
-    # offsets that no link takes
-    left_out = not given & {"offset", "theta", "row"} and re.search(r"[1-9]|pi|π", " ".join(turns), re.I)
-    if grids and not left_out and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
-        return
-    code.refuse(runs[0].start, runs[0].inside, *_OF_LOOP)
+def _bound(target: str, over: str, k: int) -> dict[str, str]:
+    """What the names of a loop stand for in its pass k."""
+    if found := re.match(r"enumerate\((.*)\)", over):
+        first, _, rest = target.partition(",")
+        return {first.strip(): str(k)} | _bound(rest.strip(" ()"), found[1], k)
+    if found := re.match(r"zip\((.*)\)", over):
+        pairs = zip(parts(target.strip("()")), parts(found[1]))
+        return {name: value for one, other in pairs for name, value in _bound(one, other, k).items()}
+    whole = re.fullmatch(r"(?:self\.)?(\w+)", over)
+    return {name: f"{whole[1]}@{k}{at}" if whole else str(k) for name, at in _counted(target)}
 
 
-def _goes_through(code: Code, call: CodeGroup, rows: int) -> bool:
-    """Whether the loop of a call goes through all rows, as far as it says, without a branch."""
-    around = [each for each in code.groups if each.bracket == "[" and each.start < call.start < call.end < each.end]
-    built = [re.search(r"\bfor\b.*", code.text[call.end : each.end], re.S) for each in around]
-    loop = next((each[0] for each in built if each), "") or re.split(r"\bfor\b", code.text[: call.start])[-1]
-    over = re.split(r"\bin\b|=|:", loop.split("\n")[0], maxsplit=1)[-1]
-    counts = dict(re.findall(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?[ \t]*$", code.text))
-    over = re.sub(r"[^\W\d]\w*", lambda found: counts.get(found[0], found[0]), over)
-    numbers = {*re.findall(r"\b\d+\b", re.sub(r"^\s*[01]\s*[:;]|\(0,|,\s*1\)", "", over))}
-    return (
-        numbers <= {str(rows)} and not re.search(r"reversed|sorted|[-+]\s*\d", over) and not re.search(r"\bif\b", loop)
-    )
-
-
-def _segments(code: Code, rows: list[_Link], runs: list[CodeGroup]) -> None:
+def _segments(code: Code, rows: list[_Link]) -> None:
     """Say what moves in KDL's ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``: its joint comes first."""
     joints = dict(re.findall(r"\bJoint\s+(\w+)\s*[({=]([^;\n]*)", code.text))
     for each in code.groups:
         if re.search(r"\bSegment\s*$", each.before):
             said = " ".join(joints.get(part, part) for part in parts(each.inside))
-            row = next((row for row in rows if each.start < row.place < each.end), None)
+            own = [row for row in rows if each.start < row.place < each.end]
             kinds = [kind for kind in _KDL if re.search(rf"\b{kind}\b", said)]
-            if kinds == ["RotZ"] and any(each.start < run.start < each.end for run in runs):
-                continue
-            if row is None or len(kinds) != 1:
+            if not own or len(kinds) != 1:
                 code.refuse(
                     each.start,
                     each.inside,
                     "is no row of a table",
                     "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out",
                 )
-            row.cells.update(type=_KDL[kinds[0]], convention="standard")
+            for row in own:
+                row.cells.update(type=_KDL[kinds[0]], convention="standard")
 
 
 _KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
@@ -413,9 +486,7 @@ def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
 
 def _constants(cells: dict[str, str]) -> list[str]:
     """The numbers of a row without theta, which can be an element ``q[0]``."""
-    return [
-        cell for name, cell in cells.items() if name == "row" or quantities_of([name]) not in ([], ["theta"], ["type"])
-    ]
+    return [cell for name, cell in cells.items() if quantities_of([name]) not in ([], ["theta"], ["type"])]
 
 
 @dataclass(frozen=True)
@@ -428,9 +499,11 @@ class _Link:
 def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
     """Links by the arms that they belong to: a name that is used again begins another arm, another list does too."""
     arms: dict[tuple[str, int], list[_Link]] = {}
+    lists = {_list_of(row) for row in rows if row.name}
     for k, row in enumerate(rows):
         uses = [other.name for other in rows[:k] if row.name].count(row.name)
-        arms.setdefault((_list_of(row), uses), []).append(row)
+        one = _list_of(row) if row.name or len(lists) > 1 else "".join(lists)
+        arms.setdefault((one, uses), []).append(row)
     return [*arms.values()]
 
 
@@ -463,8 +536,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
         order = words_of("alpha a theta d sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
         if len(given) < 4:
-            whole = given and _ELEMENT.fullmatch(given[0]) and not "".join(given[1:]).strip("0.")
-            return {"row": given[0]} if whole else None
+            return None
         cells |= dict(zip(order, given))
     elif low in _ORDERS and len(given) <= len(order := _ORDERS[low].split(",")):
         cells |= dict(zip(order, given))
@@ -521,7 +593,7 @@ def _is_row(cells: Iterable[str]) -> bool:
 
 def _records(code: Code) -> list[Grid]:
     """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated; if
-    such keys hold lists, these are columns (:func:`_vectors`)."""
+    such keys hold lists, these are columns (:func:`_of_lists`)."""
     tables = [[(0, dict[str, str]())]]
     level = 0
     for number, line in enumerate(code.text.split("\n"), 1):
@@ -656,35 +728,19 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     return next(iter(found.values())) if len(found) == 1 else []
 
 
-def _zipped(code: Code) -> dict[str, str]:
-    """The list that each variable of a loop over ``zip`` goes through, as its element."""
-    loops = re.findall(r"\bfor\s+([\w, ()]+?)\s+in\s+(?:enumerate\()?zip\(([\w., ]+)\)", code.text)
-    return {
-        name: f"{one}[i]"
-        for names, lists in loops
-        for name, one in zip(re.findall(r"\w+", names)[::-1], re.findall(r"[\w.]+", lists)[::-1])
-    }
-
-
-def _given_to(code: Code, *, toolbox: bool = False) -> Iterator[tuple[str, str]]:
-    """The names of a row's parts and what calls give for them, of a variable of ``zip`` its list."""
-    lists = _zipped(code)
+def _given_to(code: Code) -> Iterator[tuple[str, str]]:
+    """The names of a row's parts and what calls give for them."""
     for each in code.groups:
         call = re.search(r"(\w+)\s*$", each.before)
         if each.bracket != "(" or call is None:
             continue
-        order = [] if toolbox and call[1] != "DH" else code.orders.get(call[1], [])
-        link = (_arguments(call[1], each.inside) or {}) if _TOOLBOX.fullmatch(call[1]) else {}
-        for name, part in (*link.items(), *zip(order, parts(each.inside))):
-            yield name, lists.get(part, part)
+        yield from zip(code.orders.get(call[1], []), parts(each.inside))
 
 
 def _indexed(code: Code) -> Iterator[str]:
     """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
     given = [*_given_to(code)]
     made = [f"{name}={part}" for name, part in given]
-    if "row" in dict(given):
-        yield from (",".join(_OF_LINK[:width]) for width in (4, 5, 6))
     found: dict[str, dict[int, str]] = {}
     pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"
     for name, row, number in re.findall(pattern, "\n".join([code.text, *made])):
@@ -723,19 +779,12 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         yield name[1], cells, code.line(group.start), name[2]
 
 
-def _vectors(code: Code) -> list[Grid]:
-    """Columns as lists: ``a = [0, 0.27, ...]``, or ``"a": [0, 0.27, ...]``, whose theta is the table's and no pose."""
-    found = ((name, _ELEMENT.fullmatch(part)) for name, part in _given_to(code, toolbox=True) if name in _OF_LINK[1:])
-    taken = {element[1]: name for name, element in found if element}
-    return _of_lists(_named_lists(code), taken) or _of_lists(_numbered(code), {})
-
-
-def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str, str]) -> list[Grid]:
-    """The columns of a table by the names of their lists, or as links take them."""
+def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
+    """A table of columns by the names of their lists: ``a = [0, 0.27, ...]``, or ``"a": [0, ...]``; theta is no pose."""
     columns: dict[str, tuple[str, list[str], int, str]] = {}  # heading, cells, line, the list's name
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
-        names = (taken.get(name, "-"),) if taken else (name, bare, bare.rpartition("_")[2])
+        names = (name, bare, bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
         quantity = heading.quantity if heading else name
         if quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
