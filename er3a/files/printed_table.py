@@ -36,7 +36,7 @@ _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
     (r"[{}$]", ""),
-    (r"\((?:t|float|double|fixed|var(?:iable|\.)?|[一-鿿]+)\)", ""),
+    (r"\((?:t|float|double|fixed|var(?:iable|\.)?|[一-鿿]+)\)|(?<=[\w°])\s+(?:fixed|var(?:iable|\.)?)$", ""),
     (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
@@ -594,12 +594,11 @@ class _Table:
                     "Write the variable into theta or d",
                 )
             found.append(kind)
-        still = next((row for row in range(len(found)) if found[row : row + 3] == ["fixed"] * 3), None)
-        if still is not None:
+        if found.count("fixed") > max(2, len(found) // 2):
             self._refuse(
-                still,
+                found.index("fixed"),
                 self.column["theta"],
-                "three rows without a variable may be joints",
+                "rows without a variable may be joints",
                 "Write q1, q2, ... where a joint turns, and one row for what is fixed",
             )
         return found

@@ -127,7 +127,7 @@ def latex_grids(text: str) -> list[Grid]:
 
 def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
     """A text's lines cut into cells, by each separator in turn; lines without it have one cell."""
-    text = re.sub(r"(?m)^[ \t]*(?:#|%|//|\*)+[ \t]*(?=\|)", "", plain(text))  # a table in comments
+    text = re.sub(r"(?m)^[ \t]*[#%/*]+!?[ \t]*(?=\|)", "", plain(text))  # a table in comments
     broken = re.sub(r"[ \t]*\n\s*(-?π)\s*\n\s*(\d)[ \t]*(?=\n)", r" \1/\2\n\n", text)  # a fraction over three lines
     lines = [
         (number, line)
@@ -164,5 +164,5 @@ def _spaced(line: str, mark: str) -> list[str]:
     line = re.sub(brackets, lambda found: re.sub(r"\s", "", found[0]), line.strip())
     line = re.sub(rf"\s*([(\[]\s*{_UNIT}\s*[)\]])", r"\1", line)
     line = re.sub(r"^(joint|link|axis|gelenk|achse)\s+(\d+|[ij#]|no\.?)\b[.:]?", r"\1\2", line, flags=re.I)
-    line = re.sub(r"(?<=[\w°*)])\s+([-+/*])\s+(?=[\w(.])", r"\1", line)
+    line = re.sub(r"(?<=[\w°*)]) ([-+/*])\s+(?=[\w(.])", r"\1", line)
     return re.split(r"\s{2,}|\t", line) if mark == "  " else line.split()

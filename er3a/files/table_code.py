@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from er3a.errors import InputError
 from er3a.files.arithmetic import amount_of, words_of
@@ -69,7 +69,7 @@ class Code:
         self.comments = dict[int, str]()
         for block in _BLOCK.finditer(text):
             self.comments |= enumerate(block[0].split("\n"), 1 + text.count("\n", 0, block.start()))
-        text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
+        text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), re.sub(r"\b(?:self\.|this->)", "", text))
         text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
         def kept(found: re.Match[str]) -> str:
@@ -197,7 +197,7 @@ def _puts_in(found: re.Match[str], name: str, table: Grid) -> bool:
     if it is 0, and a list may be converted as a whole, ``DH = np.radians(DH)``."""
     place, sign, given = found.groups()
     value = re.sub(r"[\[(][\w:, +-]*[\])]", "", given or "")  # without indices
-    own = re.search(rf"(?<![\w.])(?:self\.)?{name}\b", value)
+    own = re.search(rf"(?<![\w.]){name}\b", value)
     if not place:
         return given is None or bool(own and not _CONVERTED.match(given))
     names = [each for _, header in table[:1] for each in header if each != "joint"]
@@ -209,7 +209,7 @@ def _puts_in(found: re.Match[str], name: str, table: Grid) -> bool:
 
 
 _SET = (
-    r"(?m)(?:^|;)[ \t]*(?:del[ \t]+NAME\b|(?:self\.)?NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
+    r"(?m)(?:^|;)[ \t]*(?:del[ \t]+NAME\b|NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
     r"[ \t]*((?:\.\w+|[\[({][^\n=\])}]*[\])}])*)[ \t]*([-+*/]?)=(?!=)([^\n;]*)))"
 )
 """A statement that puts something into a list, or gives its name to something else."""
@@ -241,6 +241,8 @@ def _calls(code: Code) -> tuple[tuple[list[Grid], dict[str, set[str]]], ...]:
             code.refuse(each.start, each.inside, *_OF_LOOP)
         made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
         made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells))]
+        if toolbox and "ikpy" in code.text:  # where theta is added to the joint's angle
+            made = [cells | {"offset": cells["theta"], "theta": "0"} for cells in made]
         target = re.sub(r"\s", "", target or "")
         if target.isidentifier() and ("type" not in (made or [{}])[0] or len(texts) > 1):
             target = ""
@@ -287,112 +289,108 @@ def _record(group: CodeGroup) -> dict[str, str]:
     return ({"joint": label[1]} if label else {}) | cells
 
 
-_LOOP = re.compile(r"\bfor\b\s*\(?\s*(?:\w+\s+)*?([\w, ()]+?)\s*(?:\bin\b|=|:)\s*([^\n]*)")
+_LOOP = re.compile(r"\bfor\b\s*\(?\s*(?:(?:const|let|auto|u?int\w*|size_t|unsigned)\s+)*([\w, ()]+?)\s*(?:\bin\b|=|:)\s*([^\n]*)")
 _INDEX = re.compile(r"@\d+|[\[({][^\[\](){}]*[\])}]|\.\w+")
-_REFERENCE = re.compile(rf"(?<![\w.'\"@])(?:self\.)?([^\W\d]\w*)((?:{_INDEX.pattern})+)")
+_REFERENCE = re.compile(rf"(?<![\w.'\"@])([^\W\d]\w*)((?:{_INDEX.pattern})+)")
 _PART = re.compile(
     r"(?m)^[ \t]*\(?(\w+(?:[ \t]*,[ \t]*\w+)*)\)?[ \t]*=(?!=)[ \t]*"
     r"([\w.]+(?:\[[^\]\n]*\]|\([^()\n]*\))*)[ \t]*;?[ \t]*$"
 )
-_LENGTH = re.compile(
-    r"(?:len|size|length|numel|height)\(\s*(?:self\.)?(\w+)\b(?:[^()]|\([^()]*\))*\)|(\w+)\.shape\[0\]"
-)
+_LENGTH = re.compile(r"(?:len|size|length|numel|height)\(\s*(\w+)\b(?:[^()]|\([^()]*\))*\)|(\w+)\.shape\[0\]")
 _RANGE = re.compile(r"range\((?:(\d+), *)?(\w+)\)|(\d+)[ ]*:[ ]*(\w+)|(\d+);[^;<]*<(=?)[ ]*(\w+);.*")
 _COUNT = re.compile(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?[ \t]*$")
-Value = str | list["Value"] | dict[str, "Value"]
 
 
 class Lists:
-    """The lists, matrices and lists of records of a program by their names, and which parts of them links take."""
+    """The lists, matrices and lists of records of a program by their names, and which of their columns links take."""
 
     def __init__(self, code: Code):
         self.code, self.taken, self.loops = code, dict[str, set[str]](), list[str]()
-        self.values = dict[str, list[Value]]()
-        self.from_one = re.search(r"(?m)^\s*end\b", code.text) is not None  # of MATLAB or Julia
-        for name, cells, _, _ in _named_lists(code):
-            if cells and ("Frame::DH(" in code.text or quantities_of([name]) != ["theta"]):  # values of joints
-                self.values[name] = [*cells]
+        self.from_one = re.search(r"(?m)^\s*end\b", code.text)  # of MATLAB or Julia
+        lists = {name: cells for name, cells, _, _ in _named_lists(code) if cells}
+        joints = () if "Frame::DH(" in code.text else ["theta"]  # which KDL has as a constant
+        self.values: dict[str, Any] = {name: each for name, each in lists.items() if quantities_of([name]) != joints}
         for group in code.groups:
             inner = [_record(each) for each in code.groups if group.start < each.start < group.end]
-            rows = [row for _, row in _rows(code, group)]
-            if len(rows) > 1:
-                self.values.setdefault(_name_of(group), [*filter(_is_row, inner)] or [*rows])
+            if len(rows := _rows(code, group)) > 1:
+                self.values.setdefault(_name_of(group), [*filter(_is_row, inner)] or [row for _, row in rows])
 
     def written_out(self, call: CodeGroup) -> list[str]:
         """The arguments of a call as often as it is carried out, with the elements of lists in place of their names."""
-        text, code = call.inside, self.code.text
+        code, passes = self.code.text, [call.inside]
         around = [each for each in self.code.groups if each.start < call.start < call.end < each.end]
         built = [found for each in around if (found := _LOOP.search(code, call.end, each.end))]
-        passes = [text]
         for loop in (built or [*_LOOP.finditer(code, 0, call.start)])[-1:]:
-            body, target, over = code[loop.end() : call.start], loop[1], loop[2].strip(" :{")
-            named = {name: f"{value}{at}" for names, value in _PART.findall(body) for name, at in _counted(names)}
-            filled = _filled(text, named)
-            outside = not built and re.search(r"\b(?:def|function)\b", body)
-            if built or (not outside and {*re.findall(r"\w+", target)} & {*re.findall(r"\w+", filled)}):
-                numbers = [] if re.search(r"\bif\b", f"{body} {over}") else self._numbers(filled, over)
-                over = over if {*re.findall(r"\w+", over)} & {*self.values} else ""  # a number
-                passes = [_filled(filled, _bound(target, over, k)) for k in numbers]
+            body, names, over = code[loop.end() : call.start], re.findall(r"\w+", loop[1]), loop[2].strip(" :{")
+            parts_of = (
+                (k, name, row) for row in _PART.finditer(body) for k, name in enumerate(re.findall(r"\w+", row[1]))
+            )
+            named = {name: f"{row[2]}@{k}" if "," in row[1] else row[2] for k, name, row in parts_of}
+            text = _filled(call.inside, named)
+            outside = re.search(r"\b(?:def|function)\b", body) or not {*names} & {*re.findall(r"\w+", text)}
+            if built or not outside:
+                branch = re.search(r"\bif\b", f"{body} {over}")
+                passes = [] if branch else [_filled(text, each) for each in self._passes(text, names, over)]
                 self.loops += {each[1] for each in _REFERENCE.finditer("".join(passes[:1])) if each[1] in self.values}
         # An element may be a sum of elements.
         return [_REFERENCE.sub(self._element, _REFERENCE.sub(self._element, each)) for each in passes]
 
     def check_left_out(self, rows: list[_Link]) -> None:
         """Refuse links that take no offsets although their lists have some, and lists that two loops go through."""
-        given = {row.cells.get(name, "") for row in rows for name in ("offset", "theta")} - {"", "0"}
         if rows and len({*self.loops}) < len(self.loops):
             self.code.refuse(rows[0].place, self.loops[0], *_OF_LOOP)
-        for name, value in self.values.items() if rows and not given else ():
-            used, cells = self.taken.get(name, set()), list[tuple[object, object]]()
-            for row in value:
-                if isinstance(row, str):
-                    cells += [(name, row)] if not used and len(value) == len(rows) else []
-                elif used and ":" not in used:
-                    cells += row.items() if isinstance(row, dict) else enumerate(row)
-            for key, cell in cells:
-                own = isinstance(key, int) or _place(str(key).rpartition("_")[2]) == "theta"
-                if own and str(key) not in used and re.search(r"[1-9]|pi|π", str(cell)):
+        if any({row.cells.get("offset", ""), row.cells.get("theta", "")} - {"", "0"} for row in rows):
+            return
+        for name, value in self.values.items() if rows else ():
+            used = self.taken.get(name, {":"})
+            of_list = isinstance(value[0], str)
+            columns = (
+                {name} if of_list else {*map(str, value[0] if isinstance(value[0], dict) else range(len(value[0])))}
+            )
+            left = columns - used if (":" in used) == of_list and len(value) == len(rows) else ()
+            for key in left:
+                own = _place(key.rpartition("_")[2]) == "theta" or key.isdigit()
+                cells = value if of_list else [row[int(key) if key.isdigit() else key] for row in value]
+                if own and re.search(r"[1-9]|pi|π", f"{cells}"):
                     self.code.refuse(rows[0].place, name, "may have offsets, which no link takes", _OF_LOOP[1])
 
-    def _numbers(self, text: str, over: str) -> Iterable[int]:
-        """The numbers of a loop's passes; all of the lists that a call takes if an unknown name says how many."""
-        counts = {name: str(len(value)) for name, value in self.values.items()}
+    def _passes(self, text: str, names: list[str], over: str) -> Iterator[dict[str, str]]:
+        """What the names of a loop stand for in each pass; a row may be unpacked into the last ones. If an unknown name
+        says how many passes there are, they go through all of the lists that a call takes."""
+        counts = {name: len(value) for name, value in self.values.items()}
         known = dict(_COUNT.findall(self.code.text))
-        bounds = _LENGTH.sub(lambda found: counts.get(found[1] or found[2], "n"), over)
+        bounds = _LENGTH.sub(lambda found: str(counts.get(found[1] or found[2], "n")), over)
         ranged = _RANGE.fullmatch(re.sub(r"[^\W\d]\w*", lambda found: known.get(found[0], found[0]), bounds))
-        names = [name for name in re.findall(r"\w+", "" if ranged else over) if name in counts]
-        names = names or [name for name in re.findall(r"\w+", text) if name in counts]
-        every = min((int(counts[name]) for name in names), default=0)
-        if ranged is None:
-            return range(every if re.match(r"enumerate\(|zip\(|[\w.]+$", over) else 0)
-        first, last = int(ranged[1] or ranged[3] or ranged[5] or 0), ranged[2] or ranged[4] or ranged[7]
-        return range(first, int(last) + bool(ranged[3] or ranged[6]) if last.isdigit() else first + every)
+        lists = [] if ranged else [name for name in re.findall(r"\w+", over) if name in counts]
+        every = min([counts[name] for name in lists or re.findall(r"\w+", text) if name in counts], default=0)
+        first, last = 0, every if re.match(r"enumerate\(|zip\(|[\w.]+$", over) else 0
+        if ranged:
+            first, end = int(ranged[1] or ranged[3] or ranged[5] or 0), ranged[2] or ranged[4] or ranged[7]
+            last = int(end) + bool(ranged[3] or ranged[6]) if end.isdigit() else first + every
+        for k in range(first, last):
+            found = [str(k)] * ("enumerate(" in over or not lists) + [f"{name}@{k}" for name in lists]
+            rest = [f"{found[-1]}@{part}" for part in range(len(names) - len(found) + 1)]
+            yield dict(zip(names, found[:-1] + rest if len(rest) > 1 else found))
 
     def _element(self, found: re.Match[str]) -> str:
         """An element of a list, or a row of a matrix; what is no list stays as it is."""
-        name, indices = found.groups()
-        value: Value = self.values.get(name, "")
-        key = ""
+        value, key = self.values.get(found[1]), ""
         try:
-            for index in _INDEX.findall(indices):
+            for index in _INDEX.findall(found[2]):
                 for part in parts(index[1:-1]) if index[0] in "[({" else [index]:
                     key = part.strip("'\"@.").lower()
-                    if isinstance(value, dict):
-                        value = value[key]
-                    elif key != ":":
-                        key = str(
-                            int(amount_of(key).number) - (index[0] in "({" or (index[0] == "[" and self.from_one))
-                        )
-                        value = value[int(key)] if int(key) >= 0 else ""
-        except (KeyError, IndexError, ValueError):
-            value = ""
-        if not value:
+                    if isinstance(value, list) and key != ":":
+                        start = index[0] in "({" or (index[0] == "[" and self.from_one)
+                        key = str(int(amount_of(key).number) - bool(start))
+                    value = value if key == ":" else value[int(key) if isinstance(value, list) else key]
+        except (KeyError, IndexError, ValueError, TypeError):
+            value = None
+        if value is None or key.startswith("-"):
             return found[0]
-        self.taken.setdefault(name, set()).add(key)
+        self.taken.setdefault(found[1], set()).add(key if isinstance(value, str) else ":")
         if isinstance(value, str):
             return f"({value})" if re.search(r"[-+*/]", value) else value
-        self.taken[name].add(":")
-        row = ", ".join(map(str, value))
+        row = ", ".join(value)
         return row if found.string[: found.start()].rstrip()[-1:] in ("[", "*") else f"[{row}]"
 
 
@@ -400,24 +398,6 @@ def _filled(text: str, given: dict[str, str]) -> str:
     """A text with what names stand for in place of them."""
     pattern = rf"(?<![\w.'\"@])(?:{'|'.join(given) or '(?!)'})\b(?![('\"]|\s*=(?!=))"
     return re.sub(pattern, lambda found: given[found[0]], text)
-
-
-def _counted(names: str) -> list[tuple[str, str]]:
-    """Each of several names with its number, one alone without any."""
-    found = re.findall(r"\w+", names)
-    return [(name, f"@{k}" if len(found) > 1 else "") for k, name in enumerate(found)]
-
-
-def _bound(target: str, over: str, k: int) -> dict[str, str]:
-    """What the names of a loop stand for in its pass k."""
-    if found := re.match(r"enumerate\((.*)\)", over):
-        first, _, rest = target.partition(",")
-        return {first.strip(): str(k)} | _bound(rest.strip(" ()"), found[1], k)
-    if found := re.match(r"zip\((.*)\)", over):
-        pairs = zip(parts(target.strip("()")), parts(found[1]))
-        return {name: value for one, other in pairs for name, value in _bound(one, other, k).items()}
-    whole = re.fullmatch(r"(?:self\.)?(\w+)", over)
-    return {name: f"{whole[1]}@{k}{at}" if whole else str(k) for name, at in _counted(target)}
 
 
 def _segments(code: Code, rows: list[_Link]) -> None:
@@ -581,7 +561,7 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
         given = [(row, key) for row in rows for key, cell in row.cells.items() if name in (cell, f"{row.name}.{key}")]
         for row, key in given:
             row.cells[key] = found[3].strip()
-        if not given and found[1] != "self":
+        if not given:
             code.refuse(found.start(), name, "is set for a link that is not found", "Write it into the link's call")
 
 
@@ -667,7 +647,7 @@ def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid
     if not header and len(rows[0][1]) > 3 and all(re.fullmatch(r"[A-Za-z][\w -]*", first) for first in firsts):
         rows, labels = [(line, cells[1:]) for line, cells in rows], firsts  # names of the joints
         header = _order(code, rows, before)
-    labelled = all(re.search(r"[^\W\d_]|^\d+$", each) and not heading_of(each) for each in labels)
+    labelled = all(re.search(r"[^\W\d_]|^\d+$", each) for each in labels) and not all(map(heading_of, labels))
     if header and "joint" not in header and labelled:
         return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
     return [(0, header), *rows]
