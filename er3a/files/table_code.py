@@ -289,7 +289,9 @@ def _record(group: CodeGroup) -> dict[str, str]:
     return ({"joint": label[1]} if label else {}) | cells
 
 
-_LOOP = re.compile(r"\bfor\b\s*\(?\s*(?:(?:const|let|auto|u?int\w*|size_t|unsigned)\s+)*([\w, ()]+?)\s*(?:\bin\b|=|:)\s*([^\n]*)")
+_LOOP = re.compile(
+    r"\bfor\b\s*\(?\s*(?:(?:const|let|auto|u?int\w*|size_t|unsigned)\s+)*([\w, ()]+?)\s*(?:\bin\b|=|:)\s*([^\n]*)"
+)
 _INDEX = re.compile(r"@\d+|[\[({][^\[\](){}]*[\])}]|\.\w+")
 _REFERENCE = re.compile(rf"(?<![\w.'\"@])([^\W\d]\w*)((?:{_INDEX.pattern})+)")
 _PART = re.compile(
@@ -320,8 +322,11 @@ class Lists:
         code, passes = self.code.text, [call.inside]
         around = [each for each in self.code.groups if each.start < call.start < call.end < each.end]
         built = [found for each in around if (found := _LOOP.search(code, call.end, each.end))]
-        for loop in (built or [*_LOOP.finditer(code, 0, call.start)])[-1:]:
-            body, names, over = code[loop.end() : call.start], re.findall(r"\w+", loop[1]), loop[2].strip(" :{")
+        loops = [
+            (code[loop.end() : call.start], *loop.groups()) for loop in built or _LOOP.finditer(code, 0, call.start)
+        ]
+        for body, target, over in loops[-1:] or [("", "i", "n")]:
+            names, over = re.findall(r"\w+", target), over.strip(" :{")
             parts_of = (
                 (k, name, row) for row in _PART.finditer(body) for k, name in enumerate(re.findall(r"\w+", row[1]))
             )
@@ -330,10 +335,11 @@ class Lists:
             outside = re.search(r"\b(?:def|function)\b", body) or not {*names} & {*re.findall(r"\w+", text)}
             if built or not outside:
                 branch = re.search(r"\bif\b", f"{body} {over}")
-                passes = [] if branch else [_filled(text, each) for each in self._passes(text, names, over)]
+                made = [] if branch else [_filled(text, each) for each in self._passes(text, names, over)]
+                passes = made or passes[: not loops]
                 self.loops += {each[1] for each in _REFERENCE.finditer("".join(passes[:1])) if each[1] in self.values}
         # An element may be a sum of elements.
-        return [_REFERENCE.sub(self._element, _REFERENCE.sub(self._element, each)) for each in passes]
+        return [_REFERENCE.sub(self._element, _REFERENCE.sub(self._element, each)).lstrip("*") for each in passes]
 
     def check_left_out(self, rows: list[_Link]) -> None:
         """Refuse links that take no offsets although their lists have some, and lists that two loops go through."""
@@ -661,10 +667,9 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     used = _columns_in(
         [
             *(
-                ",".join(names)
-                for name, names in code.orders.items()
-                if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
-                or (name in code.fields and re.search(rf"\b{name}\b", before))
+                ",".join(code.orders[name])
+                for name in code.fields
+                if re.search(rf"\b{name}\b.", before) and name in code.orders
             ),
             *_UNPACKED.findall(code.text),
             *_ENUM.findall(code.text),
@@ -708,22 +713,11 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     return next(iter(found.values())) if len(found) == 1 else []
 
 
-def _given_to(code: Code) -> Iterator[tuple[str, str]]:
-    """The names of a row's parts and what calls give for them."""
-    for each in code.groups:
-        call = re.search(r"(\w+)\s*$", each.before)
-        if each.bracket != "(" or call is None:
-            continue
-        yield from zip(code.orders.get(call[1], []), parts(each.inside))
-
-
 def _indexed(code: Code) -> Iterator[str]:
     """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
-    given = [*_given_to(code)]
-    made = [f"{name}={part}" for name, part in given]
     found: dict[str, dict[int, str]] = {}
     pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"
-    for name, row, number in re.findall(pattern, "\n".join([code.text, *made])):
+    for name, row, number in re.findall(pattern, code.text):
         if heading_of(name):
             found.setdefault(row, {})[int(number)] = name
     for names in found.values():
@@ -746,7 +740,7 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
-            r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
+            r"[\[{:%]|(?<!\w)\([^()]*,|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
             re.sub(r"\w\[[^\[\]]*\]|\w+::", "q", _closed_up(inside)),
         )
         if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
