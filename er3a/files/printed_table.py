@@ -88,6 +88,8 @@ _GIVEN = re.compile(
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
+_JOINT = re.compile(r"(?<!\w)(?:q|θ|th|theta|t)_?[\[(]?\d")
+"""A variable of a joint, which one of another name may be given by: ``theta2 = q2 - pi/2``."""
 _CHAIN = re.compile(
     r"(?<![=!<>])=(?=[^=\n]*[-+*/^(])[ \t]*-?[\w.()]+(?:[ \t]*[-+*/^][ \t]*[\w.()]+)*[ \t]*=(?=[ \t]*[-+.\d])"
 )
@@ -458,7 +460,7 @@ class _Table:
         found: dict[str, str] = {}
         for name, value, unit in given:
             made = _CALL.fullmatch(value)
-            if not re.search(r"[\[\"']|\(\)$", value) and (made is None or made[1] in CALLED):
+            if not re.search(r"[\"']|\[(?!\d+\])|\(\)$", value) and (made is None or made[1] in CALLED):
                 value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
                 found[name] = value if found.get(name, value) == value else TWO_VALUES
         plainly: dict[str, str] = {}
@@ -530,7 +532,12 @@ class _Table:
             return None
         given = self.given
         if self.headings[k].quantity == "theta":  # a value of a joint there is a pose
-            given = {name: value for name, value in given.items() if not re.fullmatch(r"(q|θ|th|theta|t)_?\d*", name)}
+            given = {
+                name: value
+                for name, value in given.items()
+                if not re.fullmatch(r"(q|θ|th|theta|t)_?\d*", name)
+                or (_JOINT.search(value) and name not in name_of(value))
+            }
         try:
             found = amount_of(text, given)
         except ValueError as error:

@@ -162,7 +162,7 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     if found and (taken or not links):
         for group in code.groups:
             _check_kept(code, group, bool(named or taken), taken)
-    if found and not links and (moved := re.search(_TURNED, code.text)):
+    if found and not (links and "type" in links[0][0][1]) and (moved := re.search(_TURNED, code.text)):
         code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
     return found
 
@@ -214,7 +214,10 @@ _SET = (
 )
 """A statement that puts something into a list, or gives its name to something else."""
 _CONVERTED = re.compile(r"\s*(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\(", re.I)
-_TURNED = r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*)?[-+].*(?:pi|\d).*"
+_TURNED = (
+    r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*)?[-+].*(?:pi|\d).*|"
+    r"^\s*((?:q|th|theta)\w*)\s*=\s*(?:\1|(?:q|th|theta)[a-z_]*)\s*[-+].*(?:pi\b|90|180).*"
+)
 _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)
 
 
@@ -295,8 +298,8 @@ _LOOP = re.compile(
 _INDEX = re.compile(r"@\d+|[\[({][^\[\](){}]*[\])}]|\.\w+")
 _REFERENCE = re.compile(rf"(?<![\w.'\"@])([^\W\d]\w*)((?:{_INDEX.pattern})+)")
 _PART = re.compile(
-    r"(?m)^[ \t]*\(?(\w+(?:[ \t]*,[ \t]*\w+)*)\)?[ \t]*=(?!=)[ \t]*"
-    r"([\w.]+(?:\[[^\]\n]*\]|\([^()\n]*\))*)[ \t]*;?[ \t]*$"
+    r"(?m)(?:^|[;{])[ \t]*(?:(?:const|float|double|auto|let|var)[ \t]+)*"
+    r"\(?(\w+(?:[ \t]*,[ \t]*\w+)*)\)?[ \t]*=(?!=)[ \t]*([^=;\n]*[^=;\s])"
 )
 _LENGTH = re.compile(r"(?:len|size|length|numel|height)\(\s*(\w+)\b(?:[^()]|\([^()]*\))*\)|(\w+)\.shape\[0\]")
 _RANGE = re.compile(r"range\((?:(\d+), *)?(\w+)\)|(\d+)[ ]*:[ ]*(\w+)|(\d+);[^;<]*<(=?)[ ]*(\w+);.*")
@@ -327,10 +330,13 @@ class Lists:
         ]
         for body, target, over in loops[-1:] or [("", "i", "n")]:
             names, over = re.findall(r"\w+", target), over.strip(" :{")
-            parts_of = (
-                (k, name, row) for row in _PART.finditer(body) for k, name in enumerate(re.findall(r"\w+", row[1]))
-            )
-            named = {name: f"{row[2]}@{k}" if "," in row[1] else row[2] for k, name, row in parts_of}
+            named = dict[str, str]()
+            for row in _PART.finditer(body):
+                value = row[2] if re.fullmatch(r"[\w.\[\]]+", row[2]) else f"({row[2]})"
+                several = "," in row[1]
+                named |= {
+                    name: f"{value}@{k}" if several else value for k, name in enumerate(re.findall(r"\w+", row[1]))
+                }
             text = _filled(call.inside, named)
             outside = re.search(r"\b(?:def|function)\b", body) or not {*names} & {*re.findall(r"\w+", text)}
             if built or not outside:

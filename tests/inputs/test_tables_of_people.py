@@ -735,6 +735,36 @@ def test_values_of_joints_may_be_put_into_a_matrix(tmp_path, put_in):
     assert len(content.dh.rows) == 2
 
 
+ROW = "def dh(theta, d, a, alpha):\n  pass\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "theta1 = q1\ntheta2 = q2 - pi/2\nT1 = dh(theta1, 0.29, 0, -pi/2)\nT2 = dh(theta2, 0, 0.27, 0)\n",
+        "theta2 = q[1] - pi/2\nT1 = dh(q[0], 0.29, 0, -pi/2)\nT2 = dh(theta2, 0, 0.27, 0)\n",
+        f"{MATRIX}for i in range(2):\n  theta = q[i] + DH[i][0]\n  T = T @ dh(theta, DH[i][1], DH[i][2], DH[i][3])\n",
+        f"{MATRIX}for row in DH:\n  off, d, a, alpha = row\n  T = T @ dh(q + off, d, a, alpha)\n",
+    ],
+)
+def test_what_a_program_adds_to_a_joints_variable_is_its_offset(tmp_path, text):
+    content, _ = read(tmp_path, ROW + text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "theta2 = theta2 - pi/2\nT1 = dh(theta1, 0.29, 0, -pi/2)\nT2 = dh(theta2, 0, 0.27, 0)\n",
+        "theta = q + np.array([0, -pi/2])\nT1 = dh(theta[0], 0.29, 0, -pi/2)\nT2 = dh(theta[1], 0, 0.27, 0)\n",
+        "q[1] = q[1] - pi/2\nT1 = dh(q[0], 0.29, 0, -pi/2)\nT2 = dh(q[1], 0, 0.27, 0)\n",
+    ],
+)
+def test_a_program_that_turns_its_joints_itself_is_asked_back(tmp_path, text):
+    with pytest.raises(InputError, match="changes theta"):
+        read(tmp_path, ROW + text)
+
+
 def test_theta_of_kdl_is_a_constant_whatever_its_name(tmp_path):
     text = KDL.replace("-M_PI_2", "theta2")
     content, _ = read(tmp_path, "double theta2 = -pi/2;\n" + text)
