@@ -42,7 +42,7 @@ _CELL = (
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
     (r"\b[A-Za-z]\w*(?:::|\.(?=[A-Za-z]))", ""),
     (r"(?<=[\d.])f\b|^\*(?=[A-Za-z])", ""),
-    (r"\^?\*+(?=$|\s*[-+])", ""),
+    (r"\^?\*+(?=$|\s*[-+])|(?<=\d)(?<!atan2)\s*\(\s*-?[\d.]+°?\s*,[^(),]*\)", ""),
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
 """Marks of variables in cells: of time, of SymPy, a star, and an offset in brackets."""
@@ -66,8 +66,8 @@ SIGNS = {
     "modified": re.compile(
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
         r"(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|修改\s*d-?h|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
-        r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
-        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)|"
+        r"(?:(?:sin|cos)\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\b[sc]a)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
+        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:(?:sin|cos)\([^\n,;*]{0,30}(?:al|α)|[sc]a\b)|"
         r"cos\((?P<twist>[^\n;]{1,40}?)\)[\s,;]+-(?:\w+\.)*sin\((?P=twist)\)[\s,;]+-[^,;\n]{0,40}sin\((?P=twist)\)",
         re.I,
     ),
@@ -456,6 +456,10 @@ class _Table:
             [_SEVERAL.sub("", self.text), *(f"{name} = {value}" for each in pairs for name, value in each)]
         )
         given = _GIVEN.findall(self.text)
+        given += (
+            (name, value, "")
+            for name, value in re.findall(r"[{,]\s*([a-z]\w*\d)\s*:\s*([-\d.]+)(?=\s*[,}])", self.text)
+        )
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
         found: dict[str, str] = {}
         for name, value, unit in given:

@@ -342,7 +342,8 @@ class Lists:
             if built or not outside:
                 branch = re.search(r"\bif\b", f"{body} {over}")
                 made = [] if branch else [_filled(text, each) for each in self._passes(text, names, over)]
-                passes = made or passes[: not loops]
+                # A loop over poses or time goes through no list.
+                passes = made or ([] if loops and {*re.findall(r"\w+", text)} & {*self.values} else passes)
                 self.loops += {each[1] for each in _REFERENCE.finditer("".join(passes[:1])) if each[1] in self.values}
         # An element may be a sum of elements.
         return [_REFERENCE.sub(self._element, _REFERENCE.sub(self._element, each)).lstrip("*") for each in passes]
@@ -709,7 +710,7 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
         text = re.sub(r"(?<=,)(\s*)_(?=,|$)", r"\1theta", re.sub(r"\b(?:joint_?)?type\b", "sigma", text))
         text = re.sub(r"(?<=\w)\s*[({_]*\s*i\s*-\s*1\s*[)}]*", "_i-1", text)
         text = re.sub(r"(?<=\w)(?:\s*\(\s*i\s*\)|\s+i(?=\s*,|$))", "_i", text)
-        words = re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text)
+        words = re.split(r"(?:[\s,;|\[\]()→]|->|\band\b|(?<!\w)-(?!\w))+", text)
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
         # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
         names = next((each for each in windows if _names_columns(each, once=len(each) > width)), [])

@@ -356,7 +356,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,72²,q1\n2,270,0,0,q2\n", "is not a number"),
         ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,72.5(2),q1\n2,270,0,0,q2\n", "is not a number"),
         ("i,a (in),α (deg),d (in),θ\n1,0,-90,23½,q1\n2,27,0,0,q2\n", "is not a number"),
-        ("L = [PrismaticDH(alpha=pi/2)]\nfor i in n:\n    L.append(RevoluteDH(d=d[i], a=a[i]))\n", "of a loop"),
+        ("L = [PrismaticDH(alpha=pi/2)]\nfor i in n:\n    L.append(RevoluteDH(d=d[i], a=a[i]))\n", r"d\[i\]"),
     ],
 )
 def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
