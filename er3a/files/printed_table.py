@@ -358,7 +358,8 @@ def _with_offsets(path: Path, text: str, grid: Grid) -> Grid:
     (line, header), *rows = grid
     for listed in _OFFSETS.finditer(text):
         cells, quantities = re.split(r"[,;\s]+", listed[2].strip(" ,;\n")), quantities_of(header)
-        if len(cells) != len(rows) or "offset" in quantities:
+        own = "".join(cell for _, row in rows for name, cell in zip(header, row) if quantities_of([name]) == ["offset"])
+        if len(cells) != len(rows) or own.strip("0."):
             continue
         of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle"))
         if "theta" in quantities or not of_angles or f"- {listed[1]}" in text:
@@ -646,9 +647,7 @@ class _Table:
             named = [[text[end] for text in texts] for end in (0, -1)]  # 0-1 is joint 1
             firsts = [int(number) for number in named[0]]
             by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(firsts, moving)}) == 1
-            if order not in named and firsts == [*range(len(moving))]:
-                self.notes.append("joints are numbered from 0")
-            elif order not in named and not by_row:
+            if order not in named and firsts != [*range(len(moving))] and not by_row:
                 labels = named[-1]
         found = dict(zip(moving, labels))
         return [found.get(row, "") for row in range(len(self.kinds))]

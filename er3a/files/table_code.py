@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -176,7 +176,7 @@ def _name_of(group: CodeGroup) -> str:
     return found[1] if found else ""
 
 
-def _check_kept(code: Code, group: CodeGroup, is_matrix: bool, taken: Collection[str]) -> None:
+def _check_kept(code: Code, group: CodeGroup, is_matrix: bool, taken: set[str]) -> None:
     """Refuse a matrix, or the list of a column, that its program changes."""
     name = _name_of(group)
     table = _matrix(code, group) if is_matrix else []
@@ -224,7 +224,7 @@ _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)
 # Calls and records ----------------------------------------------------------------------------------------------------
 
 
-def _calls(code: Code) -> tuple[tuple[list[Grid], dict[str, set[str]]], ...]:
+def _calls(code: Code) -> tuple[tuple[list[Grid], set[str]], ...]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row, and records
     ``{"a": 0, "alpha": 90, ...}``, with the lists of which they take elements; then such calls of other functions."""
     rows, own, unread, records = list[_Link](), list[_Link](), list[CodeGroup](), list[_Link]()
@@ -254,27 +254,27 @@ def _calls(code: Code) -> tuple[tuple[list[Grid], dict[str, set[str]]], ...]:
             target = f"{added[1]}[{each.start}"
         for k, cells in enumerate(made):
             name = f"{target}.{k}" if target and len(made) > 1 else target
-            (rows if of_lists or texts == [each.inside] else own).append(_Link(name, each.start, cells))
+            (own if order and not of_lists else rows).append(_Link(name, each.start, cells))
         if toolbox and not (made or order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
             unread.append(each)
     if "Frame::DH(" in code.text:
         _segments(code, rows)
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
         code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
+    if not loose.taken:
+        rows, own = sorted(rows + own, key=lambda row: row.place), []
     _assigned(code, rows)
-    if rows and (re.search(_ADDED, code.text) or len(rows) == 1):
+    if rows and (re.search(_ADDED, code.text) or len(rows) == 1 or len({*lists.loops}) < len(lists.loops)):
         code.refuse(rows[0].place, ", ".join(_constants(rows[0].cells)), *_OF_LOOP)
-    lists.check_left_out(rows)
     if not lists.taken:
         rows = sorted(rows + records, key=lambda row: row.place)
     names = {row.name: row for row in rows}
     chosen = [row_cells(each.inside) for each in code.groups if each.bracket == "["]
     arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
+    taken = [id(row) for each in arms for row in each]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
-    chosen_rows = [row for each in arms for row in each]
-    several = [each for each in held if len(each) > 1] or [rows]
-    held = [each for one in several for each in _begun_again(one)]
-    arms += [each for each in held if not chosen_rows or (_list_of(each[0]) and each[0] not in chosen_rows)]
+    for one in [each for each in held if len(each) > 1] or [rows]:
+        arms += [each for each in _begun_again(one) if not taken or (_list_of(each[0]) and id(each[0]) not in taken)]
     grids = [_grid([(code.line(row.place), row.cells) for row in each]) for each in (*arms, own)]
     return (grids[:-1], lists.taken), (grids[-1:] if len(own) > 1 else [], loose.taken)
 
@@ -307,10 +307,10 @@ _COUNT = re.compile(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?
 
 
 class Lists:
-    """The lists, matrices and lists of records of a program by their names, and which of their columns links take."""
+    """The lists, matrices and lists of records of a program by their names, and which ones links take."""
 
     def __init__(self, code: Code):
-        self.code, self.taken, self.loops = code, dict[str, set[str]](), list[str]()
+        self.code, self.taken, self.loops = code, set[str](), list[str]()
         self.from_one = re.search(r"(?m)^\s*end\b", code.text)  # of MATLAB or Julia
         lists = {name: cells for name, cells, _, _ in _named_lists(code) if cells}
         joints = () if "Frame::DH(" in code.text else ["theta"]  # which KDL has as a constant
@@ -348,25 +348,6 @@ class Lists:
         # An element may be a sum of elements.
         return [_REFERENCE.sub(self._element, _REFERENCE.sub(self._element, each)).lstrip("*") for each in passes]
 
-    def check_left_out(self, rows: list[_Link]) -> None:
-        """Refuse links that take no offsets although their lists have some, and lists that two loops go through."""
-        if rows and len({*self.loops}) < len(self.loops):
-            self.code.refuse(rows[0].place, self.loops[0], *_OF_LOOP)
-        if any({row.cells.get("offset", ""), row.cells.get("theta", "")} - {"", "0"} for row in rows):
-            return
-        for name, value in self.values.items() if rows else ():
-            used = self.taken.get(name, {":"})
-            of_list = isinstance(value[0], str)
-            columns = (
-                {name} if of_list else {*map(str, value[0] if isinstance(value[0], dict) else range(len(value[0])))}
-            )
-            left = columns - used if (":" in used) == of_list and len(value) == len(rows) else ()
-            for key in left:
-                own = _place(key.rpartition("_")[2]) == "theta" or key.isdigit()
-                cells = value if of_list else [row[int(key) if key.isdigit() else key] for row in value]
-                if own and re.search(r"[1-9]|pi|π", f"{cells}"):
-                    self.code.refuse(rows[0].place, name, "may have offsets, which no link takes", _OF_LOOP[1])
-
     def _passes(self, text: str, names: list[str], over: str) -> Iterator[dict[str, str]]:
         """What the names of a loop stand for in each pass; a row may be unpacked into the last ones. If an unknown name
         says how many passes there are, they go through all of the lists that a call takes."""
@@ -400,7 +381,7 @@ class Lists:
             value = None
         if value is None or key.startswith("-"):
             return found[0]
-        self.taken.setdefault(found[1], set()).add(key if isinstance(value, str) else ":")
+        self.taken.add(found[1])
         if isinstance(value, str):
             return f"({value})" if re.search(r"[-+*/]", value) else value
         row = ", ".join(value)

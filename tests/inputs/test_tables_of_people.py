@@ -793,9 +793,7 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         (f"{LINES}L = [{LINK} for i in reversed(range(2))]\n", "of a loop"),
         (f"{LINES}L = []\nfor i in range(2):\n    if i:\n        L.append({LINK})\n", "of a loop"),
         (f"{LINES}L = []\n{2 * f'for i in range(2):{chr(10)}    L.append({LINK}){chr(10)}'}", "of a loop"),
-        (f"{RECORDS}L = [RevoluteDH(d=p['d'], a=p['a'], alpha=p['alpha']) for p in dh]\n", "may have offsets"),
-        (f"{MATRIX}L = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH]\n", "may have offsets"),
-        (f"{LINES}offset = [0, -pi/2]\nL = [{LINK} for i in range(2)]\n", "'offset' may have offsets"),
+        (f"{LINES}offset = [0, -pi/2]\nL = [{LINK} for i in range(2)]\n", "'offset' may be offsets"),
         (
             f"{MATRIX}DH[1][2] = 0.5\nL = [RevoluteDH(d=r[1], a=r[2], alpha=r[3], offset=r[0]) for r in DH]\n",
             "changes 'DH'",
