@@ -20,8 +20,8 @@ from typing import NoReturn
 from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import CALLED, TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
 from er3a.files.csv_file import Lines
-from er3a.files.table_cells import MARKS, Grid, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import LIBRARIES, Code, code_grids
+from er3a.files.table_cells import MARKS, Grid, Words, html_grids, latex_grids, line_grids, without_latex
+from er3a.files.table_code import LIBRARIES, Cells, Code, code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -310,7 +310,7 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
     return [table for table in tables if len(table) > 1] or _turned(grid)
 
 
-def _numeric(cells: list[str]) -> bool:
+def _numeric(cells: Words) -> bool:
     return 2 * sum(bool(re.search(r"\d|π", cell)) for cell in cells) > len(cells)
 
 
@@ -377,7 +377,7 @@ class _Table:
     """A table with its headings, of which each cell becomes an amount."""
 
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
-        self.path, self.notes, self.unsaid = path, list[str](), set[str]()
+        self.path, self.notes, self.unsaid = path, Words(), set[str]()
         of_words = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", of_words) if from_code else without_latex(plain(of_words))
         grid = _with_offsets(path, self.text, grid) if from_code else grid
@@ -402,7 +402,7 @@ class _Table:
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             raise InputError(path, "types of joints", f"'{kind[0]}' is no column of the table", "Add a column of types")
-        self.columns: dict[str, list[str]] = {"joint": self._joints()}
+        self.columns: dict[str, Words] = {"joint": self._joints()}
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
         place = f"column {self.header[k]}"
@@ -448,7 +448,7 @@ class _Table:
                     return one
         return None
 
-    def _given(self) -> dict[str, str]:
+    def _given(self) -> Cells:
         """Values of symbols, as expressions; a symbol with two values has none."""
         # a2 = sqrt(3^2 + 4^2) = 5: what it amounts to
         self.text = re.sub(_CHAIN, "=", self.text)
@@ -457,18 +457,15 @@ class _Table:
             [_SEVERAL.sub("", self.text), *(f"{name} = {value}" for each in pairs for name, value in each)]
         )
         given = _GIVEN.findall(self.text)
-        given += (
-            (name, value, "")
-            for name, value in re.findall(r"[{,]\s*([a-z]\w*\d)\s*:\s*([-\d.]+)(?=\s*[,}])", self.text)
-        )
+        given += re.findall(r"[{,]\s*([a-z]\w*\d)\s*:\s*([-\d.]+)()(?=\s*[,}])", self.text)
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
-        found: dict[str, str] = {}
+        found: Cells = {}
         for name, value, unit in given:
             made = _CALL.fullmatch(value)
             if not re.search(r"[\"']|\[(?!\d+\])|\(\)$", value) and (made is None or made[1] in CALLED):
                 value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
                 found[name] = value if found.get(name, value) == value else TWO_VALUES
-        plainly: dict[str, str] = {}
+        plainly: Cells = {}
         for name, value in found.items():
             plainly[name_of(name)] = value if plainly.get(name_of(name), value) == value else TWO_VALUES
         return plainly | found
@@ -563,7 +560,7 @@ class _Table:
             self._refuse(row, k, f"'{cell}' is not a number", "Write a number")
         return replace(found, variables=names)
 
-    def _kinds(self) -> list[str]:
+    def _kinds(self) -> Words:
         """The type of each row: its d slides if that is a variable, and theta none; nothing moves in a row that has no
         variable although others have one, or at an end if it alone has no number in its name."""
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
@@ -623,7 +620,7 @@ class _Table:
         found = self._of("d" if self.kinds[row] == "prismatic" else "theta")[row]
         return next(iter(found.variables.items()), ("", 1.0)) if found else ("", 1.0)
 
-    def _joints(self) -> list[str]:
+    def _joints(self) -> Words:
         """The number of each row's joint, "" where nothing moves.
 
         The variables' numbers, from 0 or 1 on, are held against the order of the rows. Where some rows are fixed, the

@@ -10,7 +10,8 @@ from html.parser import HTMLParser
 
 from er3a.files.arithmetic import plain, words_of
 
-Row = tuple[int, list[str]]
+Words = list[str]
+Row = tuple[int, Words]
 """The number of a line in the text, and its cells."""
 Grid = list[Row]
 
@@ -143,7 +144,7 @@ def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
             yield mark, [(number, _edged(line, mark)) for number, line in lines]
 
 
-def _edged(line: str, mark: str) -> list[str]:
+def _edged(line: str, mark: str) -> Words:
     line = line.replace("||", "|") if line.startswith("||") else line
     cells = [without_latex(cell).strip() for cell in re.sub(r"<sub>|</sub>|\*\*|`", "", line).split(mark)]
     framed = not cells[0]  # otherwise an empty cell at the end is one of the table's
@@ -158,7 +159,7 @@ def _delimited(text: str, mark: str) -> Grid:
         return []
 
 
-def _spaced(line: str, mark: str) -> list[str]:
+def _spaced(line: str, mark: str) -> Words:
     """Cells with blanks between them; a unit, an index and a sum stay together."""
     brackets = r"\[[^\]]*\]|(?<=[\w*°)])\s*\([^()]*\)"
     line = re.sub(brackets, lambda found: re.sub(r"\s", "", found[0]), line.strip())

@@ -10,9 +10,13 @@ from typing import Any, NoReturn
 from er3a.errors import InputError
 from er3a.files.arithmetic import amount_of, words_of
 from er3a.files.code_brackets import CodeGroup, groups_of, parts
-from er3a.files.table_cells import Grid
+from er3a.files.table_cells import Grid, Words
 from er3a.files.table_headings import heading_of, quantities_of
 
+Cells = dict[str, str]
+"""A row by the names of its columns."""
+NamedList = tuple[str, Words, int, str]
+"""A list's name, its cells, its line, and ``:`` or ``=``."""
 _COMMENT = re.compile(
     r"""("(?:[^"\\\n]|\\.)*"|(?<![\w\])}.'])'(?:[^'\\\n]|\\.)*')|(?:(?<![:\w])//|[%\#])+([^\n]*)|\.\.\.(?=\s*(?:%[^\n]*)?\n)"""
 )
@@ -88,7 +92,7 @@ class Code:
         """The number of the line of a place in the text."""
         return self.text.count("\n", 0, place) + 1
 
-    def order_near(self, last: int, first: int, width: int) -> list[str]:
+    def order_near(self, last: int, first: int, width: int) -> Words:
         """The names of columns that a comment says, in the last lines up to six above the first row."""
         lines = range(last, max(first - 6, 0), -1)
         return next((names for k in lines if (names := _columns_in([self.comments.get(k, "")], width))), [])
@@ -98,7 +102,7 @@ class Code:
         raise InputError(None, f"line {self.line(place)}", f"'{' '.join(text.split())[:60]}' {problem}", remedy)
 
 
-def row_cells(text: str) -> list[str]:
+def row_cells(text: str) -> Words:
     """The elements of a list, with commas or, as MATLAB takes them, blanks between them."""
     cells = parts(text)
     if len(cells) == 1 or not re.search("[\"']", text):
@@ -132,7 +136,7 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
     return grid
 
 
-def _pairs(texts: Iterable[str]) -> dict[str, str]:
+def _pairs(texts: Iterable[str]) -> Cells:
     """Values by their keys, of texts such as ``"a": 0`` and ``.a = 0``."""
     pairs = [re.split("[:=]", part, maxsplit=1) for part in texts if re.search("[:=]", part)]
     return {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
@@ -227,12 +231,10 @@ _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)
 def _calls(code: Code) -> tuple[tuple[list[Grid], set[str]], ...]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row, and records
     ``{"a": 0, "alpha": 90, ...}``, with the lists of which they take elements; then such calls of other functions."""
-    rows, own, unread, records = list[_Link](), list[_Link](), list[CodeGroup](), list[_Link]()
+    rows, own, unread = list[_Link](), list[_Link](), list[CodeGroup]()
+    records = [_Link("", each.start, _record(each)) for each in code.groups if each.bracket == "{"]
     lists, loose = Lists(code), Lists(code)
     for each in code.groups:
-        if each.bracket == "{" and _is_row(cells := _record(each)):
-            records.append(_Link("", each.start, cells))
-            continue
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
@@ -244,14 +246,9 @@ def _calls(code: Code) -> tuple[tuple[list[Grid], set[str]], ...]:
             code.refuse(each.start, each.inside, *_OF_LOOP)
         made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
         made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells))]
-        if toolbox and "ikpy" in code.text:  # where theta is added to the joint's angle
+        if toolbox and "ikpy" in code.text:  # whose theta is added to the joint's angle
             made = [cells | {"offset": cells["theta"], "theta": "0"} for cells in made]
-        target = re.sub(r"\s", "", target or "")
-        if target.isidentifier() and ("type" not in (made or [{}])[0] or len(texts) > 1):
-            target = ""
-        added = re.search(r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", each.before, re.S)
-        if added:
-            target = f"{added[1]}[{each.start}"
+        target = _target(each, target or "", bool(toolbox) and len(texts) == 1)
         for k, cells in enumerate(made):
             name = f"{target}.{k}" if target and len(made) > 1 else target
             (own if order and not of_lists else rows).append(_Link(name, each.start, cells))
@@ -267,22 +264,34 @@ def _calls(code: Code) -> tuple[tuple[list[Grid], set[str]], ...]:
     if rows and (re.search(_ADDED, code.text) or len(rows) == 1 or len({*lists.loops}) < len(lists.loops)):
         code.refuse(rows[0].place, ", ".join(_constants(rows[0].cells)), *_OF_LOOP)
     if not lists.taken:
-        rows = sorted(rows + records, key=lambda row: row.place)
+        rows = sorted([*rows, *(row for row in records if _is_row(row.cells))], key=lambda row: row.place)
+    grids = [_grid([(code.line(row.place), row.cells) for row in each]) for each in (*_arms(code, rows), own)]
+    return (grids[:-1], lists.taken), (grids[-1:] if len(own) > 1 else [], loose.taken)
+
+
+def _target(call: CodeGroup, name: str, named: bool) -> str:
+    """The name of a link, with the list that it is appended to or put in; ``named``: whether it may have its own."""
+    added = re.search(r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", call.before, re.S)
+    name = f"{added[1]}[{call.start}" if added else re.sub(r"\s", "", name)
+    return "" if name.isidentifier() and not named else name
+
+
+def _arms(code: Code, rows: list[_Link]) -> list[list[_Link]]:
+    """The links of each arm: those that a list names or holds, and the rest by their lists."""
     names = {row.name: row for row in rows}
     chosen = [row_cells(each.inside) for each in code.groups if each.bracket == "["]
     arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
-    taken = [id(row) for each in arms for row in each]
+    taken = [row for each in arms for row in each]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
     for one in [each for each in held if len(each) > 1] or [rows]:
-        arms += [each for each in _begun_again(one) if not taken or (_list_of(each[0]) and id(each[0]) not in taken)]
-    grids = [_grid([(code.line(row.place), row.cells) for row in each]) for each in (*arms, own)]
-    return (grids[:-1], lists.taken), (grids[-1:] if len(own) > 1 else [], loose.taken)
+        arms += [each for each in _begun_again(one) if not taken or (_list_of(each[0]) and each[0] not in taken)]
+    return arms
 
 
 _OF_LOOP = ("is of a loop, or of another program", "Write a row for each joint")
 
 
-def _record(group: CodeGroup) -> dict[str, str]:
+def _record(group: CodeGroup) -> Cells:
     """A record's cells, with the number that its own key has; none of a type."""
     if re.search(r"\b(?:struct|class|interface|type)\s+\w[^;={}]*$", group.before):
         return {}
@@ -295,6 +304,7 @@ def _record(group: CodeGroup) -> dict[str, str]:
 _LOOP = re.compile(
     r"\bfor\b\s*\(?\s*(?:(?:const|let|auto|u?int\w*|size_t|unsigned)\s+)*([\w, ()]+?)\s*(?:\bin\b|=|:)\s*([^\n]*)"
 )
+MOST_PASSES = 99  # more than any arm has links
 _INDEX = re.compile(r"@\d+|[\[({][^\[\](){}]*[\])}]|\.\w+")
 _REFERENCE = re.compile(rf"(?<![\w.'\"@])([^\W\d]\w*)((?:{_INDEX.pattern})+)")
 _PART = re.compile(
@@ -310,17 +320,17 @@ class Lists:
     """The lists, matrices and lists of records of a program by their names, and which ones links take."""
 
     def __init__(self, code: Code):
-        self.code, self.taken, self.loops = code, set[str](), list[str]()
+        self.code, self.taken, self.loops = code, set[str](), Words()
         self.from_one = re.search(r"(?m)^\s*end\b", code.text)  # of MATLAB or Julia
-        lists = {name: cells for name, cells, _, _ in _named_lists(code) if cells}
         joints = () if "Frame::DH(" in code.text else ["theta"]  # which KDL has as a constant
-        self.values: dict[str, Any] = {name: each for name, each in lists.items() if quantities_of([name]) != joints}
+        lists = (each for each in _named_lists(code) if each[1] and quantities_of(each[:1]) != joints)
+        self.values: dict[str, Any] = {name: cells for name, cells, _, _ in lists}
         for group in code.groups:
-            inner = [_record(each) for each in code.groups if group.start < each.start < group.end]
-            if len(rows := _rows(code, group)) > 1:
-                self.values.setdefault(_name_of(group), [*filter(_is_row, inner)] or [row for _, row in rows])
+            if len(rows := _rows(code, group)) > 1 and (name := _name_of(group)) not in self.values:
+                inner = [_record(each) for each in code.groups if group.start < each.start < group.end]
+                self.values[name] = [each for each in inner if _is_row(each)] or [row for _, row in rows]
 
-    def written_out(self, call: CodeGroup) -> list[str]:
+    def written_out(self, call: CodeGroup) -> Words:
         """The arguments of a call as often as it is carried out, with the elements of lists in place of their names."""
         code, passes = self.code.text, [call.inside]
         around = [each for each in self.code.groups if each.start < call.start < call.end < each.end]
@@ -330,13 +340,11 @@ class Lists:
         ]
         for body, target, over in loops[-1:] or [("", "i", "n")]:
             names, over = re.findall(r"\w+", target), over.strip(" :{")
-            named = dict[str, str]()
+            named = Cells()
             for row in _PART.finditer(body):
                 value = row[2] if re.fullmatch(r"[\w.\[\]]+", row[2]) else f"({row[2]})"
-                several = "," in row[1]
-                named |= {
-                    name: f"{value}@{k}" if several else value for k, name in enumerate(re.findall(r"\w+", row[1]))
-                }
+                own = re.findall(r"\w+", row[1])
+                named |= {name: f"{value}@{k}" if own[1:] else value for k, name in enumerate(own)}
             text = _filled(call.inside, named)
             outside = re.search(r"\b(?:def|function)\b", body) or not {*names} & {*re.findall(r"\w+", text)}
             if built or not outside:
@@ -348,7 +356,7 @@ class Lists:
         # An element may be a sum of elements.
         return [_REFERENCE.sub(self._element, _REFERENCE.sub(self._element, each)).lstrip("*") for each in passes]
 
-    def _passes(self, text: str, names: list[str], over: str) -> Iterator[dict[str, str]]:
+    def _passes(self, text: str, names: Words, over: str) -> Iterator[Cells]:
         """What the names of a loop stand for in each pass; a row may be unpacked into the last ones. If an unknown name
         says how many passes there are, they go through all of the lists that a call takes."""
         counts = {name: len(value) for name, value in self.values.items()}
@@ -361,14 +369,15 @@ class Lists:
         if ranged:
             first, end = int(ranged[1] or ranged[3] or ranged[5] or 0), ranged[2] or ranged[4] or ranged[7]
             last = int(end) + bool(ranged[3] or ranged[6]) if end.isdigit() else first + every
-        for k in range(first, last):
+        for k in range(first, min(last, MOST_PASSES)):
             found = [str(k)] * ("enumerate(" in over or not lists) + [f"{name}@{k}" for name in lists]
             rest = [f"{found[-1]}@{part}" for part in range(len(names) - len(found) + 1)]
             yield dict(zip(names, found[:-1] + rest if len(rest) > 1 else found))
 
     def _element(self, found: re.Match[str]) -> str:
         """An element of a list, or a row of a matrix; what is no list stays as it is."""
-        value, key = self.values.get(found[1]), ""
+        value: Any = self.values.get(found[1])
+        key = "-"
         try:
             for index in _INDEX.findall(found[2]):
                 for part in parts(index[1:-1]) if index[0] in "[({" else [index]:
@@ -378,8 +387,8 @@ class Lists:
                         key = str(int(amount_of(key).number) - bool(start))
                     value = value if key == ":" else value[int(key) if isinstance(value, list) else key]
         except (KeyError, IndexError, ValueError, TypeError):
-            value = None
-        if value is None or key.startswith("-"):
+            key = "-"
+        if key[0] == "-":
             return found[0]
         self.taken.add(found[1])
         if isinstance(value, str):
@@ -388,7 +397,7 @@ class Lists:
         return row if found.string[: found.start()].rstrip()[-1:] in ("[", "*") else f"[{row}]"
 
 
-def _filled(text: str, given: dict[str, str]) -> str:
+def _filled(text: str, given: Cells) -> str:
     """A text with what names stand for in place of them."""
     pattern = rf"(?<![\w.'\"@])(?:{'|'.join(given) or '(?!)'})\b(?![('\"]|\s*=(?!=))"
     return re.sub(pattern, lambda found: given[found[0]], text)
@@ -420,7 +429,7 @@ _OF_ROWS = re.compile(r"\w*(?:dh|denavit|link|trans|frame)\w*|[AT]", re.I)
 """Names of functions of a row, whose order a comment may say."""
 
 
-def _signatures(code: Code) -> dict[str, list[str]]:
+def _signatures(code: Code) -> dict[str, Words]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
     # KDL's joint comes before the frame, whose theta is a constant, whatever its name.
@@ -437,19 +446,19 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
 
 
-def _parameters(text: str) -> list[str]:
+def _parameters(text: str) -> Words:
     """Names of parameters without their types and defaults."""
     names = [re.sub(r"\s*[:=].*", "", part).rpartition(" ")[2].strip("&*\"'") for part in parts(text)]
     return names[names[0] == "self" :]
 
 
-def _of_signature(order: list[str], text: str) -> dict[str, str]:
+def _of_signature(order: Words, text: str) -> Cells:
     """A row of a function's arguments; none of its definition."""
     cells = {name: part.strip("\"'") for name, part in zip(order, parts(text))}
     return {} if len(cells) < len(order) or _parameters(text) == order else cells
 
 
-def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
+def _says_numbers(code: Code, cells: Cells) -> bool:
     """Whether a row holds numbers or names of numbers, and no elements of lists."""
     texts = _constants(cells)
     return not any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)|\bc\(", cell) for cell in texts) and any(
@@ -458,7 +467,7 @@ def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
     )
 
 
-def _constants(cells: dict[str, str]) -> list[str]:
+def _constants(cells: Cells) -> Words:
     """The numbers of a row without theta, which can be an element ``q[0]``."""
     return [cell for name, cell in cells.items() if quantities_of([name]) not in ([], ["theta"], ["type"])]
 
@@ -467,7 +476,7 @@ def _constants(cells: dict[str, str]) -> list[str]:
 class _Link:
     name: str
     place: int
-    cells: dict[str, str]
+    cells: Cells
 
 
 def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
@@ -486,10 +495,10 @@ def _list_of(row: _Link) -> str:
     return "".join(re.findall(r"(.*)[(\[{]", row.name))
 
 
-def _arguments(function: str, text: str) -> dict[str, str] | None:
+def _arguments(function: str, text: str) -> Cells | None:
     """A row's cells by their headings; None if the call makes no link."""
     low, toolbox = function.lower(), _TOOLBOX.fullmatch(function)
-    given, words, cells = list[str](), list[str](), dict[str, str]()
+    given, words, cells = Words(), Words(), Cells()
     pending = ""
     for part in parts(text):
         key, is_named, value = part.partition("=")
@@ -529,7 +538,7 @@ def _argument(key: str) -> str:
 _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
 
 
-def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[str, str]:
+def _of_toolbox(function: str, words: Words, cells: Cells) -> Cells:
     """A row of a toolbox: what is left out is 0; theta of a joint that turns, and d of one that slides, is its own."""
     words += [flag for flag in ("mdh", "flip") if cells.pop(flag, "0").lower() in ("1", "true")]
     said = " ".join([function, *words])
@@ -568,7 +577,7 @@ def _is_row(cells: Iterable[str]) -> bool:
 def _records(code: Code) -> list[Grid]:
     """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated; if
     such keys hold lists, these are columns (:func:`_of_lists`)."""
-    tables = [[(0, dict[str, str]())]]
+    tables = [[(0, Cells())]]
     level = 0
     for number, line in enumerate(code.text.split("\n"), 1):
         found = re.fullmatch(r"(\s*)(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
@@ -588,7 +597,7 @@ def _records(code: Code) -> list[Grid]:
     return [_grid(rows) for rows in full if len(rows) > 1]
 
 
-def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
+def _grid(rows: list[tuple[int, Cells]]) -> Grid:
     header = list(dict.fromkeys(key for _, cells in rows for key in cells))
     blank = ["1" if key == "direction" else "" for key in header]
     return [(0, header), *((line, [*map(cells.get, header, blank)]) for line, cells in rows)]
@@ -612,7 +621,7 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
 
 def _listed(code: Code) -> Grid:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
-    rows, labels, arms = Grid(), list[str](), set[str]()
+    rows, labels, arms = Grid(), Words(), set[str]()
     stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
     for group in code.groups:
         label = re.search(
@@ -633,7 +642,7 @@ def _listed(code: Code) -> Grid:
     return _titled(code, rows, labels) if len(rows) > 1 and len(arms) == 1 else []
 
 
-def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid:
+def _titled(code: Code, rows: Grid, labels: Words, before: str = "") -> Grid:
     """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
     symbols = [re.sub(r"\d+$", "", cell) for cell in rows[0][1]]  # theta1 d1 a1 alpha1
     header = _order(code, rows, before) or (symbols if _names_columns(symbols) else [])
@@ -647,7 +656,7 @@ def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid
     return [(0, header), *rows]
 
 
-def _order(code: Code, rows: Grid, before: str) -> list[str]:
+def _order(code: Code, rows: Grid, before: str) -> Words:
     """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
     of a library."""
     width = len(rows[0][1])
@@ -684,9 +693,9 @@ def _place(name: str) -> str:
     return next(iter(quantities_of([name])), name).replace("offset", "theta")
 
 
-def _columns_in(texts: Iterable[str], width: int) -> list[str]:
+def _columns_in(texts: Iterable[str], width: int) -> Words:
     """The names of columns that texts hold one after the other; [] if they hold several orders."""
-    found: dict[str, list[str]] = {}
+    found: dict[str, Words] = {}
     for text in texts:
         text = re.sub(r"(?<=,)(\s*)_(?=,|$)", r"\1theta", re.sub(r"\b(?:joint_?)?type\b", "sigma", text))
         text = re.sub(r"(?<=\w)\s*[({_]*\s*i\s*-\s*1\s*[)}]*", "_i-1", text)
@@ -712,13 +721,13 @@ def _indexed(code: Code) -> Iterator[str]:
         yield ",".join(names[k] for k in sorted(names))
 
 
-def _names_columns(names: list[str], *, once: bool = False) -> bool:
+def _names_columns(names: Words, *, once: bool = False) -> bool:
     """Whether names are those of a D-H table's columns, each once; with ``once`` theta and its offset count as one."""
     quantities = {name.replace("offset", "theta") if once else name for name in quantities_of(names)}
     return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
 
 
-def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
+def _named_lists(code: Code) -> Iterator[NamedList]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
         name = re.search(
@@ -741,9 +750,9 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         yield name[1], cells, code.line(group.start), name[2]
 
 
-def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
-    """A table of columns by the names of their lists: ``a = [0, 0.27, ...]``, or ``"a": [0, ...]``; theta is no pose."""
-    columns: dict[str, tuple[str, list[str], int, str]] = {}  # heading, cells, line, the list's name
+def _of_lists(lists: Iterable[NamedList]) -> list[Grid]:
+    """A table of columns by the names of their lists: ``a = [0, 0.27, ...]``, ``"a": [0, ...]``; theta is no pose."""
+    columns: dict[str, NamedList] = {}  # heading, cells, line, the list's name
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
         names = (name, bare, bare.rpartition("_")[2])
@@ -794,7 +803,7 @@ _USED = re.compile(
 _OF_VECTORS = words_of("a alpha d theta offset type direction pose")
 
 
-def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
+def _numbered(code: Code) -> Iterator[NamedList]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
     name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)"
