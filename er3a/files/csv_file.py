@@ -21,6 +21,9 @@ LARGEST_DIGITS = 9
 MAX_BYTES = 50_000_000
 
 Lines = list[tuple[int, list[str]]]
+CsvRow = dict[str, Any]
+"""A row by its columns; ``row`` is its line."""
+CsvRows = list[CsvRow]
 """Fields of a file's lines, with the lines' numbers."""
 OWN_HEAD = re.compile(r"(?m)^# er3a: .*$")
 """Remarks at the head of a table of motion that er3a has written."""
@@ -81,7 +84,7 @@ CHECKED_COLUMN = columns_of(f"{UNITS_CHECKED}:yes?~")
 """The column that says yes where numbers which look like metres or radians are mm and degrees."""
 
 
-def read_csv(path: str | Path, columns: Mapping[str, CsvColumn], lines: Lines | None = None) -> list[dict[str, Any]]:
+def read_csv(path: str | Path, columns: Mapping[str, CsvColumn], lines: Lines | None = None) -> CsvRows:
     """Read a CSV file with exactly these columns (any order); rows as dicts with a ``row`` key (file line).
 
     ``lines``: what :func:`read_lines` found, if it has been read.

@@ -18,12 +18,12 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from er3a.errors import InputError
-from er3a.files.csv_file import columns_of, read_csv, read_lines
+from er3a.files.csv_file import CsvRow, CsvRows, columns_of, read_csv, read_lines
 from er3a.files.printed_table import (
     FIXED,
     PER_MM,
@@ -35,7 +35,7 @@ from er3a.files.printed_table import (
 )
 from er3a.files.robot_file import AS_PRINTED, SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MAX_DEG, doubt, look_like_radians
-from er3a.files.yaml_file import parse
+from er3a.files.yaml_file import Content, parse
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, rpy_of, translation
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import RADIANS_BELOW_DEG, limit_in_degrees
@@ -168,7 +168,7 @@ def _check_pairs_of_limits(path: Path, given: set[str]) -> None:
             raise InputError(path, f"column {missing.pop()}", problem, "Give both limits, or none")
 
 
-def _short_lengths(path: Path, rows: list[dict[str, Any]], own: set[str], as_printed: bool, meant: bool) -> bool:
+def _short_lengths(path: Path, rows: CsvRows, own: set[str], as_printed: bool, meant: bool) -> bool:
     """Whether the table has lengths below two millimetres. Unless they are meant, or in columns that said their unit
     (``own``), they are refused, or, with ``as_printed``, doubted if no length is longer."""
     short = [(row, key) for row in rows for key in ("a_mm", "d_mm") if 0 < abs(row[key]) < SHORTEST_PLAIN_LENGTH_MM]
@@ -191,7 +191,7 @@ PARALLEL = 1e-9  # sine of an angle between axes below which a common normal has
 DIGITS = 9  # of mm and deg, that products of matrices leave
 
 
-def _without_fixed_rows(rows: list[dict[str, Any]], convention: str) -> tuple[list[dict[str, Any]], dict[str, Reals]]:
+def _without_fixed_rows(rows: CsvRows, convention: str) -> tuple[CsvRows, dict[str, Reals]]:
     """The rows of joints, and what fixed rows before and after them make of base, flange and tool, (4, 4), mm.
 
     A fixed row between two joints is exactly part of the link there. Any rigid transform between two axes is
@@ -199,7 +199,7 @@ def _without_fixed_rows(rows: list[dict[str, Any]], convention: str) -> tuple[li
     ends commute with the joints' motions, so they join theta and d of the neighbouring rows.
     """
     base, between, tool = np.eye(4), np.eye(4), np.eye(4)
-    joints: list[dict[str, Any]] = []
+    joints: CsvRows = []
     waiting = carried = False
     for row in rows:
         carried |= row.get("type") == "tool"
@@ -217,19 +217,19 @@ def _without_fixed_rows(rows: list[dict[str, Any]], convention: str) -> tuple[li
     return joints, {"base": base, "flange": between, "tool": tool}
 
 
-def _across(row: dict[str, Any]) -> Reals:
+def _across(row: CsvRow) -> Reals:
     turn: Reals = rot_x(math.radians(row["alpha_deg"])) @ rot_y(math.radians(row.get("beta_deg") or 0.0))
     return translation(row["a_mm"], 0, 0) @ turn
 
 
-def _fixed(row: dict[str, Any], convention: str) -> Reals:
+def _fixed(row: CsvRow, convention: str) -> Reals:
     """A row's transform (4, 4), mm, with the variable at 0."""
     theta = (row.get("offset_deg") or 0.0) + (row.get("theta_deg") or 0.0)
     along: Reals = rot_z(math.radians(theta)) @ translation(0, 0, row["d_mm"])
     return along @ _across(row) if convention == "standard" else _across(row) @ along
 
 
-def _join(before: dict[str, Any], fixed: Reals, after: dict[str, Any], convention: str) -> None:
+def _join(before: CsvRow, fixed: Reals, after: CsvRow, convention: str) -> None:
     """Make a fixed transform (4, 4), mm, part of the link between two rows."""
     link = before if convention == "standard" else after
     T = _across(link) @ fixed if convention == "standard" else fixed @ _across(link)
@@ -248,7 +248,7 @@ def _join(before: dict[str, Any], fixed: Reals, after: dict[str, Any], conventio
         row["d_mm"] = round(row["d_mm"] + shift, DIGITS)
 
 
-def _placement(T: Reals, source: str) -> dict[str, Any]:
+def _placement(T: Reals, source: str) -> Content:
     xyz, rpy = ((np.round(each, DIGITS) + 0.0).tolist() for each in (T[:3, 3], np.degrees(rpy_of(T))))
     return {"source": f"Table {source}, a row without a joint", "grade": "claim", "xyz_mm": xyz, "rpy_deg": rpy}
 
@@ -278,7 +278,7 @@ def _usual_unit(column: str) -> tuple[str, float]:
     return (re.sub(r"_(cm|m|in|rad)(_s)?$", rf"_{unit}\2", column) if unit else column), scale
 
 
-def _in_usual_units(row: dict[str, Any]) -> dict[str, Any]:
+def _in_usual_units(row: CsvRow) -> CsvRow:
     found = {}
     for column, value in row.items():
         name, scale = _usual_unit(column)
@@ -288,7 +288,7 @@ def _in_usual_units(row: dict[str, Any]) -> dict[str, Any]:
 
 def _in_own_units(
     path: Path,
-    rows: list[dict[str, Any]],
+    rows: CsvRows,
     length_unit: LengthUnit | None,
     angle_unit: AngleUnit | None,
     as_printed: bool,
@@ -385,13 +385,13 @@ def headed_units(
     return {name: meant.get(unit, unit) for name, unit in units.items() if unit in (*PER_MM, "deg", "rad")}
 
 
-def _in_radians(rows: list[dict[str, Any]], column: str) -> bool:
+def _in_radians(rows: CsvRows, column: str) -> bool:
     """Whether a column's values can all be radians, and are not all 0."""
     values = [abs(row[column]) for row in rows if row[column]]
     return bool(values) and max(values) < RADIANS_BELOW_DEG
 
 
-def _twists_in_radians(rows: list[dict[str, Any]], own: set[str], unsaid: bool) -> bool:
+def _twists_in_radians(rows: CsvRows, own: set[str], unsaid: bool) -> bool:
     """Whether all twists are right angles in radians, as printed with two decimals or more; two at least, or one where
     no heading says degrees (``unsaid``)."""
     twists = [row["alpha_deg"] for row in rows if row["alpha_deg"]]
@@ -414,11 +414,11 @@ def _likely_unit(lengths: list[float]) -> LengthUnit:
     return "mm" if not metres else "m" if max(lengths) < LONGEST_LINK_M else "cm"
 
 
-def _unit(row: dict[str, Any]) -> str:
+def _unit(row: CsvRow) -> str:
     return "mm" if row.get("type") == "prismatic" else "deg"
 
 
-def _check_kind(path: Path, row: dict[str, Any], given: set[str]) -> None:
+def _check_kind(path: Path, row: CsvRow, given: set[str]) -> None:
     """Reject cells that are empty, or filled in for the other kind of joint."""
     unit = _unit(row)
     own = {f"lower_{unit}", f"upper_{unit}", f"speed_{unit}_s", "theta_deg" if unit == "mm" else "offset_deg"}
@@ -435,19 +435,19 @@ def _check_kind(path: Path, row: dict[str, Any], given: set[str]) -> None:
             raise InputError(path, where, f"joint {row['joint']} {kind}", remedy)
 
 
-def _far_normals(rows: list[dict[str, Any]], convention: str) -> bool:
+def _far_normals(rows: CsvRows, convention: str) -> bool:
     shift = 1 if convention == "modified" else 0
     alphas = [row["alpha_deg"] for row in rows[shift:]] + [0.0] * shift
     return far_normals([(row["d_mm"], alpha) for row, alpha in zip(rows, alphas)])
 
 
-def _calibrated(rows: list[dict[str, Any]], convention: str) -> bool:
+def _calibrated(rows: CsvRows, convention: str) -> bool:
     """Whether the table says so, has turns about y, or normals far away that cancel."""
     stated = any(row.get("calibrated") == "true" or row.get("beta_deg") for row in rows)
     return stated or _far_normals(rows, convention)
 
 
-def _filled(row: dict[str, Any]) -> dict[str, Any]:
+def _filled(row: CsvRow) -> CsvRow:
     """A row with what is assumed where its table has no column, without the columns of the other kind of joint."""
     unit, other, angle = ("mm", "deg", "offset_deg") if _unit(row) == "mm" else ("deg", "mm", "theta_deg")
     kind = {"type": "prismatic", "theta_deg": 0.0} if unit == "mm" else {"offset_deg": 0.0}
@@ -457,18 +457,18 @@ def _filled(row: dict[str, Any]) -> dict[str, Any]:
     return assumed | {key: value for key, value in row.items() if value is not None and key not in others}
 
 
-def _content(rows: list[dict[str, Any]], given: set[str], name: str, convention: str, source: str) -> dict[str, Any]:
+def _content(rows: CsvRows, given: set[str], name: str, convention: str, source: str) -> Content:
     units = {_unit(row) for row in rows}
     filled = [_filled(row) for row in rows]
 
-    def group(known: bool, *keys: str) -> dict[str, Any]:
+    def group(known: bool, *keys: str) -> Content:
         grade: Grade = "claim" if known else "inferred"
         own = [{key: row[key] for key in ("joint", *keys) if key in row} for row in filled]
         return {"source": f"Table {source}" if known else "Not in the table; assumed", "grade": grade, "rows": own}
 
     table = group(True, "type", "theta_deg", "a_mm", "alpha_deg", "d_mm", "beta_deg")
     limits = [f"{end}_{unit}" for unit in units for end in ("lower", "upper")]
-    content: dict[str, Any] = {
+    content: Content = {
         "kind": "robot",
         "name": name,
         "title": name,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from PIL import Image
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.files.csv_file import METRES, CsvColumn, read_csv, read_header, refuse_unit
+from er3a.files.csv_file import METRES, CsvColumn, CsvRows, read_csv, read_header, refuse_unit
 from er3a.files.orientations import FORMS, POSITION, form_in, poses_of
 from er3a.files.robot_file import Text
 from er3a.files.units import WIDEST_IN_RADIANS, doubt, joint_names, refuse_radians
@@ -39,7 +39,7 @@ from er3a.vision.calibration_set import CalibrationSet
 TOLERANCE = 1e-3  # quaternions are written with as few as four digits
 
 
-def _poses(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> Reals:
+def _poses(path: Path, rows: CsvRows, stream: str, form: str) -> Reals:
     """Poses (N, 4, 4), m, of which the units are judged, too."""
     prefix = f"{stream}_"
     refuse_unit(path, rows, [prefix + name for name in POSITION], METRES)
@@ -243,7 +243,7 @@ def check_samples(table: Path) -> str:
     return "samples of a hand-eye calibration"
 
 
-def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
+def sample_rows(table: Path) -> tuple[CsvRows, list[str]]:
     """Read a table of samples, whose columns depend on how flange and board are given.
 
     Parameters
@@ -289,9 +289,7 @@ def _form(table: Path, header: list[str], stream: str) -> str:
     return form
 
 
-def _flange(
-    table: Path, rows: list[dict[str, Any]], header: list[str], robot: Robot | None
-) -> tuple[Reals, Reals | None]:
+def _flange(table: Path, rows: CsvRows, header: list[str], robot: Robot | None) -> tuple[Reals, Reals | None]:
     """T_world_flange (N, 4, 4), from joint values by the robot's table where they are given; else a controller gives it
     from the robot's own base."""
     given = joint_names(table, header)
@@ -322,9 +320,7 @@ def _touched(table: Path, robot: Robot | None = None) -> Reals:
     return found
 
 
-def _targets_of_images(
-    table: Path, rows: list[dict[str, Any]], names: tuple[str, ...], entry: ImageEntry
-) -> SeenImages:
+def _targets_of_images(table: Path, rows: CsvRows, names: tuple[str, ...], entry: ImageEntry) -> SeenImages:
     for row in rows:
         if not row.get("image"):
             raise InputError(table, f"row {row['row']}, column image", "no image is named", "Name its file")

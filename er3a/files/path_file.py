@@ -33,6 +33,7 @@ from er3a.files.csv_file import (
     METRES,
     UNITS_CHECKED,
     CsvColumn,
+    CsvRows,
     is_own,
     read_csv,
     read_header,
@@ -262,7 +263,7 @@ def _joint_order(path: Path, names: list[str]) -> list[int]:
     return sorted(range(len(names)), key=numbers.__getitem__)
 
 
-def _row_joints(path: Path, rows: list[dict[str, Any]], names: tuple[str, ...]) -> Reals:
+def _row_joints(path: Path, rows: CsvRows, names: tuple[str, ...]) -> Reals:
     """Joint values (n, joints) in rad, or m of columns in mm."""
     turning = [name for name in names if name.endswith("_deg")]
     values = np.array([[row[name] for name in names] for row in rows])
@@ -281,14 +282,14 @@ def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
         raise InputError(path, places[-1], f"{times[-1]:g} s is too long", "Write seconds, not ms")
 
 
-def _poses(path: Path, rows: list[dict[str, Any]], form: str) -> Reals:
+def _poses(path: Path, rows: CsvRows, form: str) -> Reals:
     refuse_unit(path, rows, POSITION, METRES)
     if form in ("rpy_deg", "zyz_deg"):
         _block(path, rows, FORMS[form])
     return poses_of(path, rows, form)
 
 
-def _block(path: Path, rows: list[dict[str, Any]], names: Sequence[str]) -> None:
+def _block(path: Path, rows: CsvRows, names: Sequence[str]) -> None:
     """Judge the unit of columns of angles by the largest row: others may well be small."""
     values = np.array([[row[name] for name in names] for row in rows])
     top = int(np.argmax(np.abs(values).max(axis=1)))

@@ -20,8 +20,8 @@ from typing import NoReturn
 from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import CALLED, TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
 from er3a.files.csv_file import Lines
-from er3a.files.table_cells import MARKS, Grid, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import LIBRARIES, Code, code_grids
+from er3a.files.table_cells import MARKS, Grid, Words, html_grids, latex_grids, line_grids, without_latex
+from er3a.files.table_code import LIBRARIES, Cells, Code, code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -36,13 +36,13 @@ _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
     (r"[{}$]", ""),
-    (r"\((?:t|float|double|fixed|var(?:iable|\.)?|[一-鿿]+)\)", ""),
+    (r"\((?:t|float|double|fixed|var(?:iable|\.)?|[一-鿿]+)\)|(?<=[\w°])\s+(?:fixed|var(?:iable|\.)?)$", ""),
     (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
     (r"\b[A-Za-z]\w*(?:::|\.(?=[A-Za-z]))", ""),
     (r"(?<=[\d.])f\b|^\*(?=[A-Za-z])", ""),
-    (r"\^?\*+(?=$|\s*[-+])", ""),
+    (r"\^?\*+(?=$|\s*[-+])|(?<=\d)(?<!atan2)\s*\(\s*-?[\d.]+°?\s*,[^(),]*\)", ""),
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
 """Marks of variables in cells: of time, of SymPy, a star, and an offset in brackets."""
@@ -66,8 +66,8 @@ SIGNS = {
     "modified": re.compile(
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
         r"(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|修改\s*d-?h|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
-        r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
-        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)|"
+        r"(?:(?:sin|cos)\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\b[sc]a)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
+        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:(?:sin|cos)\([^\n,;*]{0,30}(?:al|α)|[sc]a\b)|"
         r"cos\((?P<twist>[^\n;]{1,40}?)\)[\s,;]+-(?:\w+\.)*sin\((?P=twist)\)[\s,;]+-[^,;\n]{0,40}sin\((?P=twist)\)",
         re.I,
     ),
@@ -88,6 +88,8 @@ _GIVEN = re.compile(
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
+_JOINT = re.compile(r"(?<!\w)(?:q|θ|th|theta|t)_?[\[(]?\d")
+"""A variable of a joint, which one of another name may be given by: ``theta2 = q2 - pi/2``."""
 _CHAIN = re.compile(
     r"(?<![=!<>])=(?=[^=\n]*[-+*/^(])[ \t]*-?[\w.()]+(?:[ \t]*[-+*/^][ \t]*[\w.()]+)*[ \t]*=(?=[ \t]*[-+.\d])"
 )
@@ -308,7 +310,7 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
     return [table for table in tables if len(table) > 1] or _turned(grid)
 
 
-def _numeric(cells: list[str]) -> bool:
+def _numeric(cells: Words) -> bool:
     return 2 * sum(bool(re.search(r"\d|π", cell)) for cell in cells) > len(cells)
 
 
@@ -356,7 +358,8 @@ def _with_offsets(path: Path, text: str, grid: Grid) -> Grid:
     (line, header), *rows = grid
     for listed in _OFFSETS.finditer(text):
         cells, quantities = re.split(r"[,;\s]+", listed[2].strip(" ,;\n")), quantities_of(header)
-        if len(cells) != len(rows) or "offset" in quantities:
+        own = "".join(cell for _, row in rows for name, cell in zip(header, row) if quantities_of([name]) == ["offset"])
+        if len(cells) != len(rows) or own.strip("0."):
             continue
         of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle"))
         if "theta" in quantities or not of_angles or f"- {listed[1]}" in text:
@@ -374,7 +377,7 @@ class _Table:
     """A table with its headings, of which each cell becomes an amount."""
 
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
-        self.path, self.notes, self.unsaid = path, list[str](), set[str]()
+        self.path, self.notes, self.unsaid = path, Words(), set[str]()
         of_words = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", of_words) if from_code else without_latex(plain(of_words))
         grid = _with_offsets(path, self.text, grid) if from_code else grid
@@ -399,7 +402,7 @@ class _Table:
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             raise InputError(path, "types of joints", f"'{kind[0]}' is no column of the table", "Add a column of types")
-        self.columns: dict[str, list[str]] = {"joint": self._joints()}
+        self.columns: dict[str, Words] = {"joint": self._joints()}
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
         place = f"column {self.header[k]}"
@@ -445,7 +448,7 @@ class _Table:
                     return one
         return None
 
-    def _given(self) -> dict[str, str]:
+    def _given(self) -> Cells:
         """Values of symbols, as expressions; a symbol with two values has none."""
         # a2 = sqrt(3^2 + 4^2) = 5: what it amounts to
         self.text = re.sub(_CHAIN, "=", self.text)
@@ -454,14 +457,15 @@ class _Table:
             [_SEVERAL.sub("", self.text), *(f"{name} = {value}" for each in pairs for name, value in each)]
         )
         given = _GIVEN.findall(self.text)
+        given += re.findall(r"[{,]\s*([a-z]\w*\d)\s*:\s*([-\d.]+)()(?=\s*[,}])", self.text)
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
-        found: dict[str, str] = {}
+        found: Cells = {}
         for name, value, unit in given:
             made = _CALL.fullmatch(value)
-            if not re.search(r"[\[\"']|\(\)$", value) and (made is None or made[1] in CALLED):
+            if not re.search(r"[\"']|\[(?!\d+\])|\(\)$", value) and (made is None or made[1] in CALLED):
                 value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
                 found[name] = value if found.get(name, value) == value else TWO_VALUES
-        plainly: dict[str, str] = {}
+        plainly: Cells = {}
         for name, value in found.items():
             plainly[name_of(name)] = value if plainly.get(name_of(name), value) == value else TWO_VALUES
         return plainly | found
@@ -530,7 +534,12 @@ class _Table:
             return None
         given = self.given
         if self.headings[k].quantity == "theta":  # a value of a joint there is a pose
-            given = {name: value for name, value in given.items() if not re.fullmatch(r"(q|θ|th|theta|t)_?\d*", name)}
+            given = {
+                name: value
+                for name, value in given.items()
+                if not re.fullmatch(r"(q|θ|th|theta|t)_?\d*", name)
+                or (_JOINT.search(value) and name not in name_of(value))
+            }
         try:
             found = amount_of(text, given)
         except ValueError as error:
@@ -551,7 +560,7 @@ class _Table:
             self._refuse(row, k, f"'{cell}' is not a number", "Write a number")
         return replace(found, variables=names)
 
-    def _kinds(self) -> list[str]:
+    def _kinds(self) -> Words:
         """The type of each row: its d slides if that is a variable, and theta none; nothing moves in a row that has no
         variable although others have one, or at an end if it alone has no number in its name."""
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
@@ -594,12 +603,11 @@ class _Table:
                     "Write the variable into theta or d",
                 )
             found.append(kind)
-        still = next((row for row in range(len(found)) if found[row : row + 3] == ["fixed"] * 3), None)
-        if still is not None:
+        if found.count("fixed") > max(2, len(found) // 2):
             self._refuse(
-                still,
+                found.index("fixed"),
                 self.column["theta"],
-                "three rows without a variable may be joints",
+                "rows without a variable may be joints",
                 "Write q1, q2, ... where a joint turns, and one row for what is fixed",
             )
         return found
@@ -612,7 +620,7 @@ class _Table:
         found = self._of("d" if self.kinds[row] == "prismatic" else "theta")[row]
         return next(iter(found.variables.items()), ("", 1.0)) if found else ("", 1.0)
 
-    def _joints(self) -> list[str]:
+    def _joints(self) -> Words:
         """The number of each row's joint, "" where nothing moves.
 
         The variables' numbers, from 0 or 1 on, are held against the order of the rows. Where some rows are fixed, the
@@ -636,9 +644,7 @@ class _Table:
             named = [[text[end] for text in texts] for end in (0, -1)]  # 0-1 is joint 1
             firsts = [int(number) for number in named[0]]
             by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(firsts, moving)}) == 1
-            if order not in named and firsts == [*range(len(moving))]:
-                self.notes.append("joints are numbered from 0")
-            elif order not in named and not by_row:
+            if order not in named and firsts != [*range(len(moving))] and not by_row:
                 labels = named[-1]
         found = dict(zip(moving, labels))
         return [found.get(row, "") for row in range(len(self.kinds))]

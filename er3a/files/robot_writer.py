@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
@@ -23,7 +22,7 @@ from er3a.files.robot_file import (
     drive_keys,
 )
 from er3a.files.robot_library import VALUES_OF_ROW
-from er3a.files.yaml_file import parse
+from er3a.files.yaml_file import Content, parse
 from er3a.formats.mesh_file import stl_of
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.si_units import from_si, split_unit
@@ -32,7 +31,7 @@ from er3a.robots.masses import MassBody
 from er3a.robots.robot import CombinedLimit, LinkMesh, Robot, Source
 
 
-def mass_groups(robot: Robot) -> dict[str, dict[str, Any]]:
+def mass_groups(robot: Robot) -> dict[str, Content]:
     """The groups of masses, drives, wrist loads and weight for a robot file, as far as they are known.
 
     Returns
@@ -41,14 +40,14 @@ def mass_groups(robot: Robot) -> dict[str, dict[str, Any]]:
         frames that move with the joints. Sources and grades are not among them.
     """
     masses = robot.masses
-    found: dict[str, dict[str, Any]] = {}
+    found: dict[str, Content] = {}
     if masses.links:
         found["inertia"] = {"frame": "joint", "links": [_link(each.link, each.body) for each in masses.links]}
     if masses.drives:
         rows = [{"joint": k + 1, **_drive(robot, k)} for k in range(robot.joints)]
         found["drives"] = {"rows": [row for row in rows if len(row) > 1] or rows[:1]}
     if masses.wrist:
-        by_joint: dict[int, dict[str, Any]] = {}
+        by_joint: dict[int, Content] = {}
         for key, values in (("moment_n_m", masses.wrist.moment), ("inertia_kg_m2", masses.wrist.inertia)):
             for joint, value in values:
                 by_joint.setdefault(joint, {"joint": joint})[key] = value
@@ -59,7 +58,7 @@ def mass_groups(robot: Robot) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _link(link: int, body: MassBody) -> dict[str, Any]:
+def _link(link: int, body: MassBody) -> Content:
     named = {name: split_unit(name) for name in BodyFields.model_fields}
     row = {name: np.asarray(from_si(unit, getattr(body, stem))).tolist() for name, (stem, unit) in named.items()}
     return row | {"link": link, "centre_mm": list(map(_tidy, row["centre_mm"]))}
@@ -84,15 +83,15 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         if the robot's values make no acceptable file; it names ``path``
     """
 
-    zero_rows, dh_rows = list[dict[str, Any]](), list[dict[str, Any]]()
+    zero_rows, dh_rows = list[Content](), list[Content]()
     for k, sliding in enumerate(robot.sliding):
         angles = {name: _tidy(np.degrees(getattr(robot, name)[k])) for name in ("alpha", "beta", "offset")}
         zero_rows.append({"direction": int(robot.direction[k]), "offset_deg": None if sliding else angles["offset"]})
-        row: dict[str, Any] = {f"{name}_mm": _tidy(getattr(robot, name)[k] * 1000) for name in ("a", "d")}
+        row: Content = {f"{name}_mm": _tidy(getattr(robot, name)[k] * 1000) for name in ("a", "d")}
         row |= {"type": "prismatic", "theta_deg": angles["offset"]} if sliding else {}
         dh_rows.append(row | {"alpha_deg": angles["alpha"], "beta_deg": angles["beta"] or None})
     lengths = np.abs(np.concatenate([robot.a, robot.d])) * 1000
-    groups: dict[str, dict[str, Any]] = {
+    groups: dict[str, Content] = {
         "dh": {
             "convention": robot.convention,
             "calibrated": _short(lengths) or bool(robot.beta.any()) or _shifted(robot.base),
@@ -109,7 +108,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         groups["coupling"] = {"rows": _coupling_rows(robot.coupling)}
     if robot.envelopes or robot.hulls or robot.meshes:
         groups["envelopes"] = _shapes(robot)
-    content: dict[str, Any] = {
+    content: Content = {
         "kind": "robot",
         "name": robot.name,
         "title": robot.title,
@@ -159,12 +158,12 @@ def _limit_rows(robot: Robot) -> list[dict]:
     return _rows(robot, "limits", [{"continuous": True} if endless else _ends(*each) for *each, endless in ends])
 
 
-def _rows(robot: Robot, group: str, rows: list[dict[str, Any]]) -> list[dict]:
+def _rows(robot: Robot, group: str, rows: list[Content]) -> list[dict]:
     """The rows of a group, with the numbers of their joints, and the documents of those that have their own."""
     return [{"joint": k, **row, **_origins(robot, group, k)} for k, row in enumerate(rows, start=1)]
 
 
-def _ends(lower: float, upper: float, slides: bool) -> dict[str, Any]:
+def _ends(lower: float, upper: float, slides: bool) -> Content:
     """Limits (m or rad) in the units of a file."""
     unit, scale = ("mm", 1000.0) if slides else ("deg", np.degrees(1.0))
     return {f"lower_{unit}": _tidy(scale * lower), f"upper_{unit}": _tidy(scale * upper)}
@@ -187,7 +186,7 @@ def _weighted(factors: np.ndarray) -> dict:
     return {"joints": (joints + 1).tolist(), "factors": factors[joints].tolist()}
 
 
-def _shapes(robot: Robot) -> dict[str, Any]:
+def _shapes(robot: Robot) -> Content:
     """Capsules and hulls as the file has them."""
 
     def point(values: Iterable[float]) -> list[float]:
@@ -216,7 +215,7 @@ def surface_files(robot: Robot) -> dict[Path, bytes]:
     return {_stl_place(each): stl_of(each) for each in (*robot.meshes, *robot.visuals)}
 
 
-def _surfaces(meshes: Sequence[LinkMesh]) -> list[dict[str, Any]]:
+def _surfaces(meshes: Sequence[LinkMesh]) -> list[Content]:
     """Triangles as the file names them."""
     return [{"link": each.link, "stl": _stl_place(each).as_posix(), "sha256": _checksum(each)} for each in meshes]
 
@@ -229,7 +228,7 @@ def _checksum(mesh: LinkMesh) -> str:
     return hashlib.sha256(stl_of(mesh)).hexdigest()
 
 
-def _decided(robot: Robot, rule: str) -> list[dict[str, Any]]:
+def _decided(robot: Robot, rule: str) -> list[Content]:
     """The pairs that a person decided on by one rule."""
     return [
         {"pair": [each.first, each.second], "reason": each.reason} for each in robot.pair_rules if each.rule == rule
@@ -264,7 +263,7 @@ def robot_text(content: RobotFile) -> str:
     return yaml_text(content.model_dump(exclude_none=True, exclude_defaults=True))
 
 
-def yaml_text(content: dict[str, Any]) -> str:
+def yaml_text(content: Content) -> str:
     """The content of one of er3a's files as YAML.
 
     Parameters

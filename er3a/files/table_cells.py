@@ -10,7 +10,8 @@ from html.parser import HTMLParser
 
 from er3a.files.arithmetic import plain, words_of
 
-Row = tuple[int, list[str]]
+Words = list[str]
+Row = tuple[int, Words]
 """The number of a line in the text, and its cells."""
 Grid = list[Row]
 
@@ -127,7 +128,7 @@ def latex_grids(text: str) -> list[Grid]:
 
 def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
     """A text's lines cut into cells, by each separator in turn; lines without it have one cell."""
-    text = re.sub(r"(?m)^[ \t]*(?:#|%|//|\*)+[ \t]*(?=\|)", "", plain(text))  # a table in comments
+    text = re.sub(r"(?m)^[ \t]*[#%/*]+!?[ \t]*(?=\|)", "", plain(text))  # a table in comments
     broken = re.sub(r"[ \t]*\n\s*(-?π)\s*\n\s*(\d)[ \t]*(?=\n)", r" \1/\2\n\n", text)  # a fraction over three lines
     lines = [
         (number, line)
@@ -143,7 +144,7 @@ def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
             yield mark, [(number, _edged(line, mark)) for number, line in lines]
 
 
-def _edged(line: str, mark: str) -> list[str]:
+def _edged(line: str, mark: str) -> Words:
     line = line.replace("||", "|") if line.startswith("||") else line
     cells = [without_latex(cell).strip() for cell in re.sub(r"<sub>|</sub>|\*\*|`", "", line).split(mark)]
     framed = not cells[0]  # otherwise an empty cell at the end is one of the table's
@@ -158,11 +159,11 @@ def _delimited(text: str, mark: str) -> Grid:
         return []
 
 
-def _spaced(line: str, mark: str) -> list[str]:
+def _spaced(line: str, mark: str) -> Words:
     """Cells with blanks between them; a unit, an index and a sum stay together."""
     brackets = r"\[[^\]]*\]|(?<=[\w*°)])\s*\([^()]*\)"
     line = re.sub(brackets, lambda found: re.sub(r"\s", "", found[0]), line.strip())
     line = re.sub(rf"\s*([(\[]\s*{_UNIT}\s*[)\]])", r"\1", line)
     line = re.sub(r"^(joint|link|axis|gelenk|achse)\s+(\d+|[ij#]|no\.?)\b[.:]?", r"\1\2", line, flags=re.I)
-    line = re.sub(r"(?<=[\w°*)])\s+([-+/*])\s+(?=[\w(.])", r"\1", line)
+    line = re.sub(r"(?<=[\w°*)]) ([-+/*])\s+(?=[\w(.])", r"\1", line)
     return re.split(r"\s{2,}|\t", line) if mark == "  " else line.split()

@@ -5,14 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from er3a.errors import InputError
-from er3a.files.arithmetic import words_of
+from er3a.files.arithmetic import amount_of, words_of
 from er3a.files.code_brackets import CodeGroup, groups_of, parts
-from er3a.files.table_cells import Grid
+from er3a.files.table_cells import Grid, Words
 from er3a.files.table_headings import heading_of, quantities_of
 
+Cells = dict[str, str]
+"""A row by the names of its columns."""
+NamedList = tuple[str, Words, int, str]
+"""A list's name, its cells, its line, and ``:`` or ``=``."""
 _COMMENT = re.compile(
     r"""("(?:[^"\\\n]|\\.)*"|(?<![\w\])}.'])'(?:[^'\\\n]|\\.)*')|(?:(?<![:\w])//|[%\#])+([^\n]*)|\.\.\.(?=\s*(?:%[^\n]*)?\n)"""
 )
@@ -69,7 +73,7 @@ class Code:
         self.comments = dict[int, str]()
         for block in _BLOCK.finditer(text):
             self.comments |= enumerate(block[0].split("\n"), 1 + text.count("\n", 0, block.start()))
-        text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
+        text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), re.sub(r"\b(?:self\.|this->)", "", text))
         text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
         def kept(found: re.Match[str]) -> str:
@@ -88,7 +92,7 @@ class Code:
         """The number of the line of a place in the text."""
         return self.text.count("\n", 0, place) + 1
 
-    def order_near(self, last: int, first: int, width: int) -> list[str]:
+    def order_near(self, last: int, first: int, width: int) -> Words:
         """The names of columns that a comment says, in the last lines up to six above the first row."""
         lines = range(last, max(first - 6, 0), -1)
         return next((names for k in lines if (names := _columns_in([self.comments.get(k, "")], width))), [])
@@ -98,7 +102,7 @@ class Code:
         raise InputError(None, f"line {self.line(place)}", f"'{' '.join(text.split())[:60]}' {problem}", remedy)
 
 
-def row_cells(text: str) -> list[str]:
+def row_cells(text: str) -> Words:
     """The elements of a list, with commas or, as MATLAB takes them, blanks between them."""
     cells = parts(text)
     if len(cells) == 1 or not re.search("[\"']", text):
@@ -132,7 +136,7 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
     return grid
 
 
-def _pairs(texts: Iterable[str]) -> dict[str, str]:
+def _pairs(texts: Iterable[str]) -> Cells:
     """Values by their keys, of texts such as ``"a": 0`` and ``.a = 0``."""
     pairs = [re.split("[:=]", part, maxsplit=1) for part in texts if re.search("[:=]", part)]
     return {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
@@ -153,29 +157,35 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), _listed(code)) if grid]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
-    links, runs = _calls(code)
+    (links, taken), (loose, elements) = _calls(code)
     links = links or _records(code)
     named = [grid for grid in matrices if grid[0][1]]
-    found = links or named or _vectors(code)
-    _check_runs(code, runs, found)
-    if found and not links:
+    found = links or named or _of_lists(_named_lists(code)) or _of_lists(_numbered(code))
+    if not found:
+        found, taken = loose, elements
+    if found and (taken or not links):
         for group in code.groups:
-            _check_kept(code, group, bool(named))
-        if moved := re.search(_TURNED, code.text):
-            code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
+            _check_kept(code, group, bool(named or taken), taken)
+    if found and not (links and "type" in links[0][0][1]) and (moved := re.search(_TURNED, code.text)):
+        code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
     return found
 
 
 _CONSTANT = {"a", "alpha", "d", "offset"}
 
 
-def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
-    """Refuse a matrix, or the list of a column, that its program changes."""
+def _name_of(group: CodeGroup) -> str:
+    """The name that a list gets."""
     found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*[\[{(\s]*$", group.before)
-    name = found[1] if found else ""
+    return found[1] if found else ""
+
+
+def _check_kept(code: Code, group: CodeGroup, is_matrix: bool, taken: set[str]) -> None:
+    """Refuse a matrix, or the list of a column, that its program changes."""
+    name = _name_of(group)
     table = _matrix(code, group) if is_matrix else []
     of_column = not is_matrix and _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
-    if not (table or of_column) or not group.inside.strip():
+    if (name not in taken if taken else not (table or of_column)) or not group.inside.strip():
         return
     used = {*re.findall(rf"\b{name}[\[(]\d+,\s*:", code.text)}
     if is_matrix and 0 < len(used) < len(_rows(code, group)):
@@ -191,7 +201,7 @@ def _puts_in(found: re.Match[str], name: str, table: Grid) -> bool:
     if it is 0, and a list may be converted as a whole, ``DH = np.radians(DH)``."""
     place, sign, given = found.groups()
     value = re.sub(r"[\[(][\w:, +-]*[\])]", "", given or "")  # without indices
-    own = re.search(rf"(?<![\w.])(?:self\.)?{name}\b", value)
+    own = re.search(rf"(?<![\w.]){name}\b", value)
     if not place:
         return given is None or bool(own and not _CONVERTED.match(given))
     names = [each for _, header in table[:1] for each in header if each != "joint"]
@@ -203,72 +213,85 @@ def _puts_in(found: re.Match[str], name: str, table: Grid) -> bool:
 
 
 _SET = (
-    r"(?m)(?:^|;)[ \t]*(?:del[ \t]+NAME\b|(?:self\.)?NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
+    r"(?m)(?:^|;)[ \t]*(?:del[ \t]+NAME\b|NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
     r"[ \t]*((?:\.\w+|[\[({][^\n=\])}]*[\])}])*)[ \t]*([-+*/]?)=(?!=)([^\n;]*)))"
 )
 """A statement that puts something into a list, or gives its name to something else."""
 _CONVERTED = re.compile(r"\s*(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\(", re.I)
-_TURNED = r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*)?[-+].*(?:pi|\d).*"
+_TURNED = (
+    r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*)?[-+].*(?:pi|\d).*|"
+    r"^\s*((?:q|th|theta)\w*)\s*=\s*(?:\1|(?:q|th|theta)[a-z_]*)\s*[-+].*(?:pi\b|90|180).*"
+)
 _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)
 
 
 # Calls and records ----------------------------------------------------------------------------------------------------
 
 
-def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
+def _calls(code: Code) -> tuple[tuple[list[Grid], set[str]], ...]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row, and records
-    ``{"a": 0, "alpha": 90, ...}``; then the calls of a toolbox that take a link from lists."""
-    rows, unread, runs = list[_Link](), list[CodeGroup](), list[CodeGroup]()
-    records = 0
+    ``{"a": 0, "alpha": 90, ...}``, with the lists of which they take elements; then such calls of other functions."""
+    rows, own, unread = list[_Link](), list[_Link](), list[CodeGroup]()
+    records = [_Link("", each.start, _record(each)) for each in code.groups if each.bracket == "{"]
+    lists, loose = Lists(code), Lists(code)
     for each in code.groups:
-        if each.bracket == "{" and _is_row(cells := _record(each)):
-            rows.append(_Link("", each.start, cells))
-            records += 1
-            continue
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
         target, function = named.groups()
         order, toolbox = code.orders.get(function, []), _TOOLBOX.fullmatch(function)
-        cells = _arguments(function, each.inside) or _of_signature(order, each.inside)
-        plainly = not {"direction", "prismatic"} & {*cells, *cells.values()}
-        if cells and plainly and (toolbox or function == "DH") and _from_lists(code, cells):
-            _check_taken(code, each, cells)
-            runs.append(each)
-        elif cells and (toolbox or _says_numbers(code, cells)):
-            target = re.sub(r"\s", "", target or "")
-            if target.isidentifier() and "type" not in cells:
-                target = ""
-            added = re.search(
-                r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", each.before, re.S
-            )
-            if added:
-                target = f"{added[1]}[{each.start}"
-            rows.append(_Link(target, each.start, cells))
-        elif toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
+        of_lists = toolbox or function == "DH"
+        texts = (lists if of_lists else loose).written_out(each) if of_lists or order else [each.inside]
+        if of_lists and not texts:
+            code.refuse(each.start, each.inside, *_OF_LOOP)
+        made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
+        made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells))]
+        if toolbox and "ikpy" in code.text:  # whose theta is added to the joint's angle
+            made = [cells | {"offset": cells["theta"], "theta": "0"} for cells in made]
+        target = _target(each, target or "", bool(toolbox) and len(texts) == 1)
+        for k, cells in enumerate(made):
+            name = f"{target}.{k}" if target and len(made) > 1 else target
+            (own if order and not of_lists else rows).append(_Link(name, each.start, cells))
+        if toolbox and not (made or order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
             unread.append(each)
     if "Frame::DH(" in code.text:
-        _segments(code, rows, runs)
+        _segments(code, rows)
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
         code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
+    if not loose.taken:
+        rows, own = sorted(rows + own, key=lambda row: row.place), []
     _assigned(code, rows)
-    if len(rows) > records and (re.search(_ADDED, code.text) or len(rows) == 1 or runs):
+    if rows and (re.search(_ADDED, code.text) or len(rows) == 1 or len({*lists.loops}) < len(lists.loops)):
         code.refuse(rows[0].place, ", ".join(_constants(rows[0].cells)), *_OF_LOOP)
+    if not lists.taken:
+        rows = sorted([*rows, *(row for row in records if _is_row(row.cells))], key=lambda row: row.place)
+    grids = [_grid([(code.line(row.place), row.cells) for row in each]) for each in (*_arms(code, rows), own)]
+    return (grids[:-1], lists.taken), (grids[-1:] if len(own) > 1 else [], loose.taken)
+
+
+def _target(call: CodeGroup, name: str, named: bool) -> str:
+    """The name of a link, with the list that it is appended to or put in; ``named``: whether it may have its own."""
+    added = re.search(r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", call.before, re.S)
+    name = f"{added[1]}[{call.start}" if added else re.sub(r"\s", "", name)
+    return "" if name.isidentifier() and not named else name
+
+
+def _arms(code: Code, rows: list[_Link]) -> list[list[_Link]]:
+    """The links of each arm: those that a list names or holds, and the rest by their lists."""
     names = {row.name: row for row in rows}
     chosen = [row_cells(each.inside) for each in code.groups if each.bracket == "["]
     arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
-    held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
     taken = [row for each in arms for row in each]
-    several = [each for each in held if len(each) > 1] or [rows]
-    held = [each for one in several for each in _begun_again(one)]
-    arms += [each for each in held if not taken or (_list_of(each[0]) and each[0] not in taken)]
-    return [_grid([(code.line(row.place), row.cells) for row in each]) for each in arms], runs
+    held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
+    for one in [each for each in held if len(each) > 1] or [rows]:
+        arms += [each for each in _begun_again(one) if not taken or (_list_of(each[0]) and each[0] not in taken)]
+    return arms
 
 
 _OF_LOOP = ("is of a loop, or of another program", "Write a row for each joint")
 
 
-def _record(group: CodeGroup) -> dict[str, str]:
+def _record(group: CodeGroup) -> Cells:
     """A record's cells, with the number that its own key has; none of a type."""
     if re.search(r"\b(?:struct|class|interface|type)\s+\w[^;={}]*$", group.before):
         return {}
@@ -278,92 +301,125 @@ def _record(group: CodeGroup) -> dict[str, str]:
     return ({"joint": label[1]} if label else {}) | cells
 
 
-_BOUND = re.compile(r"\bfor\b\s*\(?\s*(?:\w+\s+)*?([\w, ()]+?)\s*(?:\bin\b|=|:)")
-_ELEMENT = re.compile(
-    r"(?:[\w.]+\[[\"']|(?:\w+\.)*)(\w+)(?:[\"']\])?\s*[\[(]\s*(\w+)\s*(?:,[\s\d:]+|\]\s*\[\s*\d+\s*)?[\])]"
+_LOOP = re.compile(
+    r"\bfor\b\s*\(?\s*(?:(?:const|let|auto|u?int\w*|size_t|unsigned)\s+)*([\w, ()]+?)\s*(?:\bin\b|=|:)\s*([^\n]*)"
 )
+MOST_PASSES = 99  # more than any arm has links
+_INDEX = re.compile(r"@\d+|[\[({][^\[\](){}]*[\])}]|\.\w+")
+_REFERENCE = re.compile(rf"(?<![\w.'\"@])([^\W\d]\w*)((?:{_INDEX.pattern})+)")
+_PART = re.compile(
+    r"(?m)(?:^|[;{])[ \t]*(?:(?:const|float|double|auto|let|var)[ \t]+)*"
+    r"\(?(\w+(?:[ \t]*,[ \t]*\w+)*)\)?[ \t]*=(?!=)[ \t]*([^=;\n]*[^=;\s])"
+)
+_LENGTH = re.compile(r"(?:len|size|length|numel|height)\(\s*(\w+)\b(?:[^()]|\([^()]*\))*\)|(\w+)\.shape\[0\]")
+_RANGE = re.compile(r"range\((?:(\d+), *)?(\w+)\)|(\d+)[ ]*:[ ]*(\w+)|(\d+);[^;<]*<(=?)[ ]*(\w+);.*")
+_COUNT = re.compile(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?[ \t]*$")
 
 
-def _from_lists(code: Code, cells: dict[str, str]) -> bool:
-    """Whether a link takes its numbers from lists: by the variable of a loop, or all by one number."""
-    bound = " ".join([*_BOUND.findall(code.text), *_UNPACKED.findall(code.text)])
-    texts = [cell for cell in _constants(cells) if not re.fullmatch(r"[-+.\d]*", cell)]
-    used = {*re.findall(r"[^\W\d]\w*", " ".join(texts))} & {*re.findall(r"[^\W\d]\w*", bound)}
-    found = [_ELEMENT.fullmatch(text) for text in texts]
-    numbers = {each[2] for each in found if each}
-    return bool(used) or (len(numbers) == 1 and all(found) and ("row" in cells or len(found) > 1))
+class Lists:
+    """The lists, matrices and lists of records of a program by their names, and which ones links take."""
+
+    def __init__(self, code: Code):
+        self.code, self.taken, self.loops = code, set[str](), Words()
+        self.from_one = re.search(r"(?m)^\s*end\b", code.text)  # of MATLAB or Julia
+        joints = () if "Frame::DH(" in code.text else ["theta"]  # which KDL has as a constant
+        lists = (each for each in _named_lists(code) if each[1] and quantities_of(each[:1]) != joints)
+        self.values: dict[str, Any] = {name: cells for name, cells, _, _ in lists}
+        for group in code.groups:
+            if len(rows := _rows(code, group)) > 1 and (name := _name_of(group)) not in self.values:
+                inner = [_record(each) for each in code.groups if group.start < each.start < group.end]
+                self.values[name] = [each for each in inner if _is_row(each)] or [row for _, row in rows]
+
+    def written_out(self, call: CodeGroup) -> Words:
+        """The arguments of a call as often as it is carried out, with the elements of lists in place of their names."""
+        code, passes = self.code.text, [call.inside]
+        around = [each for each in self.code.groups if each.start < call.start < call.end < each.end]
+        built = [found for each in around if (found := _LOOP.search(code, call.end, each.end))]
+        loops = [
+            (code[loop.end() : call.start], *loop.groups()) for loop in built or _LOOP.finditer(code, 0, call.start)
+        ]
+        for body, target, over in loops[-1:] or [("", "i", "n")]:
+            names, over = re.findall(r"\w+", target), over.strip(" :{")
+            named = Cells()
+            for row in _PART.finditer(body):
+                value = row[2] if re.fullmatch(r"[\w.\[\]]+", row[2]) else f"({row[2]})"
+                own = re.findall(r"\w+", row[1])
+                named |= {name: f"{value}@{k}" if own[1:] else value for k, name in enumerate(own)}
+            text = _filled(call.inside, named)
+            outside = re.search(r"\b(?:def|function)\b", body) or not {*names} & {*re.findall(r"\w+", text)}
+            if built or not outside:
+                branch = re.search(r"\bif\b", f"{body} {over}")
+                made = [] if branch else [_filled(text, each) for each in self._passes(text, names, over)]
+                # A loop over poses or time goes through no list.
+                passes = made or ([] if loops and {*re.findall(r"\w+", text)} & {*self.values} else passes)
+                self.loops += {each[1] for each in _REFERENCE.finditer("".join(passes[:1])) if each[1] in self.values}
+        # An element may be a sum of elements.
+        return [_REFERENCE.sub(self._element, _REFERENCE.sub(self._element, each)).lstrip("*") for each in passes]
+
+    def _passes(self, text: str, names: Words, over: str) -> Iterator[Cells]:
+        """What the names of a loop stand for in each pass; a row may be unpacked into the last ones. If an unknown name
+        says how many passes there are, they go through all of the lists that a call takes."""
+        counts = {name: len(value) for name, value in self.values.items()}
+        known = dict(_COUNT.findall(self.code.text))
+        bounds = _LENGTH.sub(lambda found: str(counts.get(found[1] or found[2], "n")), over)
+        ranged = _RANGE.fullmatch(re.sub(r"[^\W\d]\w*", lambda found: known.get(found[0], found[0]), bounds))
+        lists = [] if ranged else [name for name in re.findall(r"\w+", over) if name in counts]
+        every = min([counts[name] for name in lists or re.findall(r"\w+", text) if name in counts], default=0)
+        first, last = 0, every if re.match(r"enumerate\(|zip\(|[\w.]+$", over) else 0
+        if ranged:
+            first, end = int(ranged[1] or ranged[3] or ranged[5] or 0), ranged[2] or ranged[4] or ranged[7]
+            last = int(end) + bool(ranged[3] or ranged[6]) if end.isdigit() else first + every
+        for k in range(first, min(last, MOST_PASSES)):
+            found = [str(k)] * ("enumerate(" in over or not lists) + [f"{name}@{k}" for name in lists]
+            rest = [f"{found[-1]}@{part}" for part in range(len(names) - len(found) + 1)]
+            yield dict(zip(names, found[:-1] + rest if len(rest) > 1 else found))
+
+    def _element(self, found: re.Match[str]) -> str:
+        """An element of a list, or a row of a matrix; what is no list stays as it is."""
+        value: Any = self.values.get(found[1])
+        key = "-"
+        try:
+            for index in _INDEX.findall(found[2]):
+                for part in parts(index[1:-1]) if index[0] in "[({" else [index]:
+                    key = part.strip("'\"@.").lower()
+                    if isinstance(value, list) and key != ":":
+                        start = index[0] in "({" or (index[0] == "[" and self.from_one)
+                        key = str(int(amount_of(key).number) - bool(start))
+                    value = value if key == ":" else value[int(key) if isinstance(value, list) else key]
+        except (KeyError, IndexError, ValueError, TypeError):
+            key = "-"
+        if key[0] == "-":
+            return found[0]
+        self.taken.add(found[1])
+        if isinstance(value, str):
+            return f"({value})" if re.search(r"[-+*/]", value) else value
+        row = ", ".join(value)
+        return row if found.string[: found.start()].rstrip()[-1:] in ("[", "*") else f"[{row}]"
 
 
-_TAKEN = re.compile(r"(?:(?:\w+\.)*(?:deg2rad|radians)\()?([^\W\d][\w.]*(?:\s*[\[(][\w:,\"' ]*[\])])*(?:\.\w+)?)\)?")
+def _filled(text: str, given: Cells) -> str:
+    """A text with what names stand for in place of them."""
+    pattern = rf"(?<![\w.'\"@])(?:{'|'.join(given) or '(?!)'})\b(?![('\"]|\s*=(?!=))"
+    return re.sub(pattern, lambda found: given[found[0]], text)
 
 
-def _check_taken(code: Code, call: CodeGroup, cells: dict[str, str]) -> None:
-    """Refuse a link that works out its numbers, or takes one for another: ``d=-p["a"]``."""
-    lists = _zipped(code)
-    for name, cell in cells.items():
-        if name in ("row", "type", "convention", "theta") or cell.strip("0.") == "":
-            continue
-        taken = _TAKEN.fullmatch(cell)
-        words = re.findall(r"[^\W\d]\w*", taken[1]) if taken else [""]
-        own = taken and (_ELEMENT.fullmatch(taken[1]) or words[-1] in lists)
-        if not own and [_place(each) for each in words[-1:] if heading_of(each)] != [_place(name)]:
-            code.refuse(call.start, cell, *_OF_LOOP)
-
-
-def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
-    """Refuse links from lists unless a loop, or one call after the other, goes through all rows of the one table."""
-    if not runs or len(grids) > 1:
-        return
-    rows = len(grids[0]) - 1 if grids else 0
-    used = [int(number) for each in runs for _, number in _ELEMENT.findall(each.inside)[-1:] if number.isdigit()]
-    one_by_one = used in (list(range(rows)), list(range(1, rows + 1))) and len(runs) == rows
-    given = {name for name, part in _given_to(code, toolbox=True) if part != "0"}
-    turns = (
-        cell
-        for (_, header), *body in grids
-        for _, cells in body
-        for name, cell in zip(header, cells)
-        if _place(name) == "theta"
-    )
-    # offsets that no link takes
-    left_out = not given & {"offset", "theta", "row"} and re.search(r"[1-9]|pi|π", " ".join(turns), re.I)
-    if grids and not left_out and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
-        return
-    code.refuse(runs[0].start, runs[0].inside, *_OF_LOOP)
-
-
-def _goes_through(code: Code, call: CodeGroup, rows: int) -> bool:
-    """Whether the loop of a call goes through all rows, as far as it says, without a branch."""
-    around = [each for each in code.groups if each.bracket == "[" and each.start < call.start < call.end < each.end]
-    built = [re.search(r"\bfor\b.*", code.text[call.end : each.end], re.S) for each in around]
-    loop = next((each[0] for each in built if each), "") or re.split(r"\bfor\b", code.text[: call.start])[-1]
-    over = re.split(r"\bin\b|=|:", loop.split("\n")[0], maxsplit=1)[-1]
-    counts = dict(re.findall(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?[ \t]*$", code.text))
-    over = re.sub(r"[^\W\d]\w*", lambda found: counts.get(found[0], found[0]), over)
-    numbers = {*re.findall(r"\b\d+\b", re.sub(r"^\s*[01]\s*[:;]|\(0,|,\s*1\)", "", over))}
-    return (
-        numbers <= {str(rows)} and not re.search(r"reversed|sorted|[-+]\s*\d", over) and not re.search(r"\bif\b", loop)
-    )
-
-
-def _segments(code: Code, rows: list[_Link], runs: list[CodeGroup]) -> None:
+def _segments(code: Code, rows: list[_Link]) -> None:
     """Say what moves in KDL's ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``: its joint comes first."""
     joints = dict(re.findall(r"\bJoint\s+(\w+)\s*[({=]([^;\n]*)", code.text))
     for each in code.groups:
         if re.search(r"\bSegment\s*$", each.before):
             said = " ".join(joints.get(part, part) for part in parts(each.inside))
-            row = next((row for row in rows if each.start < row.place < each.end), None)
+            own = [row for row in rows if each.start < row.place < each.end]
             kinds = [kind for kind in _KDL if re.search(rf"\b{kind}\b", said)]
-            if kinds == ["RotZ"] and any(each.start < run.start < each.end for run in runs):
-                continue
-            if row is None or len(kinds) != 1:
+            if not own or len(kinds) != 1:
                 code.refuse(
                     each.start,
                     each.inside,
                     "is no row of a table",
                     "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out",
                 )
-            row.cells.update(type=_KDL[kinds[0]], convention="standard")
+            for row in own:
+                row.cells.update(type=_KDL[kinds[0]], convention="standard")
 
 
 _KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
@@ -373,7 +429,7 @@ _OF_ROWS = re.compile(r"\w*(?:dh|denavit|link|trans|frame)\w*|[AT]", re.I)
 """Names of functions of a row, whose order a comment may say."""
 
 
-def _signatures(code: Code) -> dict[str, list[str]]:
+def _signatures(code: Code) -> dict[str, Words]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
     # KDL's joint comes before the frame, whose theta is a constant, whatever its name.
@@ -390,19 +446,19 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
 
 
-def _parameters(text: str) -> list[str]:
+def _parameters(text: str) -> Words:
     """Names of parameters without their types and defaults."""
     names = [re.sub(r"\s*[:=].*", "", part).rpartition(" ")[2].strip("&*\"'") for part in parts(text)]
     return names[names[0] == "self" :]
 
 
-def _of_signature(order: list[str], text: str) -> dict[str, str]:
+def _of_signature(order: Words, text: str) -> Cells:
     """A row of a function's arguments; none of its definition."""
     cells = {name: part.strip("\"'") for name, part in zip(order, parts(text))}
     return {} if len(cells) < len(order) or _parameters(text) == order else cells
 
 
-def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
+def _says_numbers(code: Code, cells: Cells) -> bool:
     """Whether a row holds numbers or names of numbers, and no elements of lists."""
     texts = _constants(cells)
     return not any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)|\bc\(", cell) for cell in texts) and any(
@@ -411,26 +467,26 @@ def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
     )
 
 
-def _constants(cells: dict[str, str]) -> list[str]:
+def _constants(cells: Cells) -> Words:
     """The numbers of a row without theta, which can be an element ``q[0]``."""
-    return [
-        cell for name, cell in cells.items() if name == "row" or quantities_of([name]) not in ([], ["theta"], ["type"])
-    ]
+    return [cell for name, cell in cells.items() if quantities_of([name]) not in ([], ["theta"], ["type"])]
 
 
 @dataclass(frozen=True)
 class _Link:
     name: str
     place: int
-    cells: dict[str, str]
+    cells: Cells
 
 
 def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
     """Links by the arms that they belong to: a name that is used again begins another arm, another list does too."""
     arms: dict[tuple[str, int], list[_Link]] = {}
+    lists = {_list_of(row) for row in rows if row.name}
     for k, row in enumerate(rows):
         uses = [other.name for other in rows[:k] if row.name].count(row.name)
-        arms.setdefault((_list_of(row), uses), []).append(row)
+        one = _list_of(row) if row.name or len(lists) > 1 else "".join(lists)
+        arms.setdefault((one, uses), []).append(row)
     return [*arms.values()]
 
 
@@ -439,10 +495,10 @@ def _list_of(row: _Link) -> str:
     return "".join(re.findall(r"(.*)[(\[{]", row.name))
 
 
-def _arguments(function: str, text: str) -> dict[str, str] | None:
+def _arguments(function: str, text: str) -> Cells | None:
     """A row's cells by their headings; None if the call makes no link."""
     low, toolbox = function.lower(), _TOOLBOX.fullmatch(function)
-    given, words, cells = list[str](), list[str](), dict[str, str]()
+    given, words, cells = Words(), Words(), Cells()
     pending = ""
     for part in parts(text):
         key, is_named, value = part.partition("=")
@@ -463,8 +519,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
         order = words_of("alpha a theta d sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
         if len(given) < 4:
-            whole = given and _ELEMENT.fullmatch(given[0]) and not "".join(given[1:]).strip("0.")
-            return {"row": given[0]} if whole else None
+            return None
         cells |= dict(zip(order, given))
     elif low in _ORDERS and len(given) <= len(order := _ORDERS[low].split(",")):
         cells |= dict(zip(order, given))
@@ -483,7 +538,7 @@ def _argument(key: str) -> str:
 _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
 
 
-def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[str, str]:
+def _of_toolbox(function: str, words: Words, cells: Cells) -> Cells:
     """A row of a toolbox: what is left out is 0; theta of a joint that turns, and d of one that slides, is its own."""
     words += [flag for flag in ("mdh", "flip") if cells.pop(flag, "0").lower() in ("1", "true")]
     said = " ".join([function, *words])
@@ -509,7 +564,7 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
         given = [(row, key) for row in rows for key, cell in row.cells.items() if name in (cell, f"{row.name}.{key}")]
         for row, key in given:
             row.cells[key] = found[3].strip()
-        if not given and found[1] != "self":
+        if not given:
             code.refuse(found.start(), name, "is set for a link that is not found", "Write it into the link's call")
 
 
@@ -521,8 +576,8 @@ def _is_row(cells: Iterable[str]) -> bool:
 
 def _records(code: Code) -> list[Grid]:
     """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated; if
-    such keys hold lists, these are columns (:func:`_vectors`)."""
-    tables = [[(0, dict[str, str]())]]
+    such keys hold lists, these are columns (:func:`_of_lists`)."""
+    tables = [[(0, Cells())]]
     level = 0
     for number, line in enumerate(code.text.split("\n"), 1):
         found = re.fullmatch(r"(\s*)(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
@@ -542,7 +597,7 @@ def _records(code: Code) -> list[Grid]:
     return [_grid(rows) for rows in full if len(rows) > 1]
 
 
-def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
+def _grid(rows: list[tuple[int, Cells]]) -> Grid:
     header = list(dict.fromkeys(key for _, cells in rows for key in cells))
     blank = ["1" if key == "direction" else "" for key in header]
     return [(0, header), *((line, [*map(cells.get, header, blank)]) for line, cells in rows)]
@@ -566,7 +621,7 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
 
 def _listed(code: Code) -> Grid:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
-    rows, labels, arms = Grid(), list[str](), set[str]()
+    rows, labels, arms = Grid(), Words(), set[str]()
     stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
     for group in code.groups:
         label = re.search(
@@ -587,7 +642,7 @@ def _listed(code: Code) -> Grid:
     return _titled(code, rows, labels) if len(rows) > 1 and len(arms) == 1 else []
 
 
-def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid:
+def _titled(code: Code, rows: Grid, labels: Words, before: str = "") -> Grid:
     """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
     symbols = [re.sub(r"\d+$", "", cell) for cell in rows[0][1]]  # theta1 d1 a1 alpha1
     header = _order(code, rows, before) or (symbols if _names_columns(symbols) else [])
@@ -595,13 +650,13 @@ def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid
     if not header and len(rows[0][1]) > 3 and all(re.fullmatch(r"[A-Za-z][\w -]*", first) for first in firsts):
         rows, labels = [(line, cells[1:]) for line, cells in rows], firsts  # names of the joints
         header = _order(code, rows, before)
-    labelled = all(re.search(r"[^\W\d_]|^\d+$", each) and not heading_of(each) for each in labels)
+    labelled = all(re.search(r"[^\W\d_]|^\d+$", each) for each in labels) and not all(map(heading_of, labels))
     if header and "joint" not in header and labelled:
         return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
     return [(0, header), *rows]
 
 
-def _order(code: Code, rows: Grid, before: str) -> list[str]:
+def _order(code: Code, rows: Grid, before: str) -> Words:
     """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
     of a library."""
     width = len(rows[0][1])
@@ -609,10 +664,9 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     used = _columns_in(
         [
             *(
-                ",".join(names)
-                for name, names in code.orders.items()
-                if name in re.findall(r"(\w+)\(\*", code.text)  # dh(*row)
-                or (name in code.fields and re.search(rf"\b{name}\b", before))
+                ",".join(code.orders[name])
+                for name in code.fields
+                if re.search(rf"\b{name}\b.", before) and name in code.orders
             ),
             *_UNPACKED.findall(code.text),
             *_ENUM.findall(code.text),
@@ -639,14 +693,14 @@ def _place(name: str) -> str:
     return next(iter(quantities_of([name])), name).replace("offset", "theta")
 
 
-def _columns_in(texts: Iterable[str], width: int) -> list[str]:
+def _columns_in(texts: Iterable[str], width: int) -> Words:
     """The names of columns that texts hold one after the other; [] if they hold several orders."""
-    found: dict[str, list[str]] = {}
+    found: dict[str, Words] = {}
     for text in texts:
         text = re.sub(r"(?<=,)(\s*)_(?=,|$)", r"\1theta", re.sub(r"\b(?:joint_?)?type\b", "sigma", text))
         text = re.sub(r"(?<=\w)\s*[({_]*\s*i\s*-\s*1\s*[)}]*", "_i-1", text)
         text = re.sub(r"(?<=\w)(?:\s*\(\s*i\s*\)|\s+i(?=\s*,|$))", "_i", text)
-        words = re.split(r"(?:[\s,;|\[\]()→]|->|\band\b)+", text)
+        words = re.split(r"(?:[\s,;|\[\]()→]|->|\band\b|(?<!\w)-(?!\w))+", text)
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
         # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
         names = next((each for each in windows if _names_columns(each, once=len(each) > width)), [])
@@ -656,51 +710,24 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     return next(iter(found.values())) if len(found) == 1 else []
 
 
-def _zipped(code: Code) -> dict[str, str]:
-    """The list that each variable of a loop over ``zip`` goes through, as its element."""
-    loops = re.findall(r"\bfor\s+([\w, ()]+?)\s+in\s+(?:enumerate\()?zip\(([\w., ]+)\)", code.text)
-    return {
-        name: f"{one}[i]"
-        for names, lists in loops
-        for name, one in zip(re.findall(r"\w+", names)[::-1], re.findall(r"[\w.]+", lists)[::-1])
-    }
-
-
-def _given_to(code: Code, *, toolbox: bool = False) -> Iterator[tuple[str, str]]:
-    """The names of a row's parts and what calls give for them, of a variable of ``zip`` its list."""
-    lists = _zipped(code)
-    for each in code.groups:
-        call = re.search(r"(\w+)\s*$", each.before)
-        if each.bracket != "(" or call is None:
-            continue
-        order = [] if toolbox and call[1] != "DH" else code.orders.get(call[1], [])
-        link = (_arguments(call[1], each.inside) or {}) if _TOOLBOX.fullmatch(call[1]) else {}
-        for name, part in (*link.items(), *zip(order, parts(each.inside))):
-            yield name, lists.get(part, part)
-
-
 def _indexed(code: Code) -> Iterator[str]:
     """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
-    given = [*_given_to(code)]
-    made = [f"{name}={part}" for name, part in given]
-    if "row" in dict(given):
-        yield from (",".join(_OF_LINK[:width]) for width in (4, 5, 6))
     found: dict[str, dict[int, str]] = {}
     pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"
-    for name, row, number in re.findall(pattern, "\n".join([code.text, *made])):
+    for name, row, number in re.findall(pattern, code.text):
         if heading_of(name):
             found.setdefault(row, {})[int(number)] = name
     for names in found.values():
         yield ",".join(names[k] for k in sorted(names))
 
 
-def _names_columns(names: list[str], *, once: bool = False) -> bool:
+def _names_columns(names: Words, *, once: bool = False) -> bool:
     """Whether names are those of a D-H table's columns, each once; with ``once`` theta and its offset count as one."""
     quantities = {name.replace("offset", "theta") if once else name for name in quantities_of(names)}
     return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
 
 
-def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
+def _named_lists(code: Code) -> Iterator[NamedList]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
         name = re.search(
@@ -710,7 +737,7 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
-            r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
+            r"[\[{:%]|(?<!\w)\([^()]*,|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
             re.sub(r"\w\[[^\[\]]*\]|\w+::", "q", _closed_up(inside)),
         )
         if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
@@ -723,19 +750,12 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         yield name[1], cells, code.line(group.start), name[2]
 
 
-def _vectors(code: Code) -> list[Grid]:
-    """Columns as lists: ``a = [0, 0.27, ...]``, or ``"a": [0, 0.27, ...]``, whose theta is the table's and no pose."""
-    found = ((name, _ELEMENT.fullmatch(part)) for name, part in _given_to(code, toolbox=True) if name in _OF_LINK[1:])
-    taken = {element[1]: name for name, element in found if element}
-    return _of_lists(_named_lists(code), taken) or _of_lists(_numbered(code), {})
-
-
-def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str, str]) -> list[Grid]:
-    """The columns of a table by the names of their lists, or as links take them."""
-    columns: dict[str, tuple[str, list[str], int, str]] = {}  # heading, cells, line, the list's name
+def _of_lists(lists: Iterable[NamedList]) -> list[Grid]:
+    """A table of columns by the names of their lists: ``a = [0, 0.27, ...]``, ``"a": [0, ...]``; theta is no pose."""
+    columns: dict[str, NamedList] = {}  # heading, cells, line, the list's name
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
-        names = (taken.get(name, "-"),) if taken else (name, bare, bare.rpartition("_")[2])
+        names = (name, bare, bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
         quantity = heading.quantity if heading else name
         if quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
@@ -783,7 +803,7 @@ _USED = re.compile(
 _OF_VECTORS = words_of("a alpha d theta offset type direction pose")
 
 
-def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
+def _numbered(code: Code) -> Iterator[NamedList]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
     name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)"

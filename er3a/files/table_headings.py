@@ -78,6 +78,7 @@ def heading_of(text: str) -> Heading | None:
         _NAMES.get(name)
         or next((quantity for mark, quantity in _WORDS.items() if mark in name), None)
         or _NAMES.get(re.sub(r"[^a-z]", "", name) if not name.isascii() else "")
+        or _NAMES.get(name.removesuffix("(offset)"))
         or (last and _NAMES.get(last[1]))
     )
     return Heading(marked, unit, bool(_BEFORE.search(short)), name) if marked else None

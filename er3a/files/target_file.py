@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, read_csv, read_header
+from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, CsvRow, CsvRows, read_csv, read_header
 from er3a.files.orientations import FORMS, POSITION, form_in, rotations
 from er3a.files.robot_file import Name
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple, joint_values
-from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, parse
+from er3a.files.yaml_file import Content, InputFile, StrictModel, check_own_names, load, parse
 from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Target, TargetOutcome
@@ -33,7 +33,7 @@ TEXTS = ("note", "expect")
 REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MAX_JOINTS + 1))
 
 
-def read_target_table(path: str | Path) -> list[dict[str, Any]]:
+def read_target_table(path: str | Path) -> CsvRows:
     """Rows of a CSV file as the mappings that a target file in YAML holds, each with the keys ``row`` (file line) and
     ``units_checked``.
 
@@ -62,7 +62,7 @@ def _without_form(header: list[str]) -> str:
     return "the table has no orientation" + (f" that is known, but {', '.join(strange)}" if strange else "")
 
 
-def _target(row: dict[str, Any], form: str, reference: tuple[str, ...]) -> dict[str, Any]:
+def _target(row: CsvRow, form: str, reference: tuple[str, ...]) -> Content:
     values = [row[name] for name in FORMS[form]]
     target = {"row": row["row"], "name": row["name"], "xyz_mm": [row[name] for name in POSITION]}
     target[form] = [values[0:3], values[3:6], values[6:9]] if form == "matrix" else values

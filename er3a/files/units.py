@@ -64,6 +64,11 @@ def joint_names(path: Path, header: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(found, key=found.__getitem__))
 
 
+def _largest(values: Sequence[float]) -> tuple[float, str]:
+    """The largest of values without signs, and all of them as shown in a message."""
+    return max(abs(value) for value in values), ", ".join(f"{value:g}" for value in values)
+
+
 def as_millimetres(values: list[float]) -> list[float]:
     """Reject lengths that can't be millimetres, as a pydantic validator.
 
@@ -80,8 +85,7 @@ def as_millimetres(values: list[float]) -> list[float]:
     ValueError
         as ``problem | remedy``: all below 5 mm, which can only be metres, or one over 100 m
     """
-    largest = max(abs(value) for value in values)
-    shown = ", ".join(f"{value:g}" for value in values)
+    largest, shown = _largest(values)
     if 0 < largest < METRES_BELOW_MM:
         raise ValueError(f"{shown} mm can only be metres | Multiply by 1000")
     if largest > MAX_DISTANCE_MM:
@@ -96,8 +100,7 @@ def check_degrees(values: Sequence[float], slides: bool = False) -> None:
     ----------
     slides : whether some can be mm of prismatic joints; :func:`joint_values` knows which
     """
-    largest = max(abs(value) for value in values)
-    shown = ", ".join(f"{value:g}" for value in values)
+    largest, shown = _largest(values)
     if largest > (MAX_DISTANCE_MM if slides else MAX_DEG):
         much = "more than ten turns, or than 100 m" if slides else "more than ten turns"
         raise ValueError(f"{shown} deg is {much} | Write degrees within +-{MAX_DEG:g}")

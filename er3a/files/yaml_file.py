@@ -19,6 +19,8 @@ from er3a.errors import DoubtfulUnit, InputError, InputWarning
 from er3a.formats.mesh_file import read_text
 
 Model = TypeVar("Model", bound=BaseModel)
+Content = dict[str, Any]
+"""What a file, or a part of one, holds by its keys."""
 
 MAX_YAML_BYTES = 250_000  # of which the worst takes seconds to read
 
@@ -132,7 +134,7 @@ def _own(content: Any) -> Any:
     return [_own(value) for value in content] if isinstance(content, list) else content
 
 
-def read_yaml(path: str | Path) -> dict[str, Any]:
+def read_yaml(path: str | Path) -> Content:
     """Read a YAML file whose top level is a mapping.
 
     Raises
@@ -161,9 +163,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     return data
 
 
-def parse(
-    model: type[Model], data: dict[str, Any], path: str | Path | None, context: dict[str, Any] | None = None
-) -> Model:
+def parse(model: type[Model], data: Content, path: str | Path | None, context: Content | None = None) -> Model:
     """Validate ``data`` as ``model``, in pydantic's ``context``; the first fault is raised as :class:`InputError`.
 
     Values that look like a mistake give an :class:`InputWarning` that names the file, and numbers of doubtful unit one
@@ -291,7 +291,7 @@ def _explain(fault: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     return f"{given[:80]} is refused", _REMEDIES.get(kind, fault["msg"])
 
 
-def _asked(bounds: dict[str, Any]) -> str:
+def _asked(bounds: Content) -> str:
     return f"at least {bounds['min_length']}" if "min_length" in bounds else f"at most {bounds['max_length']}"
 
 

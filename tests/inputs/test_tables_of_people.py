@@ -314,10 +314,6 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "# a, alpha, d, theta\nM = [[0, 0.3, 0, 1], [0, 0, 0.2, 1]]\nfor theta, d, a, alpha in M:\n",
             "the program theta",
         ),
-        (
-            "d = [0, 0]\na = [1, 1]\nalpha = [0, 0]\nr = [PrismaticDH(a=a[i], alpha=alpha[i]) for i in n]",
-            "a row for each",
-        ),
         ("# a alpha d theta\nM = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\njoint_types = ['R', 'P']", "types"),
         ("a = [0, 1]\nalpha = [0, 0]\nd = [1, 0]\ntheta = [q['a'], 1]", "column theta: 'q"),
         ("r = [0, 1]\nl = [1, 2]\nd = [1, 0]\nalpha = [0, 0]", "'l' is another list of a"),
@@ -360,7 +356,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,72²,q1\n2,270,0,0,q2\n", "is not a number"),
         ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,72.5(2),q1\n2,270,0,0,q2\n", "is not a number"),
         ("i,a (in),α (deg),d (in),θ\n1,0,-90,23½,q1\n2,27,0,0,q2\n", "is not a number"),
-        ("L = [PrismaticDH(alpha=pi/2)]\nfor i in n:\n    L.append(RevoluteDH(d=d[i], a=a[i]))\n", "of a loop"),
+        ("L = [PrismaticDH(alpha=pi/2)]\nfor i in n:\n    L.append(RevoluteDH(d=d[i], a=a[i]))\n", r"d\[i\]"),
     ],
 )
 def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
@@ -704,6 +700,26 @@ def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text, end):
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        f"{LINES}L = [RevoluteDH(d=0.29, alpha=-pi/2)]\nfor i in range(1, 2):\n"
+        "    L.append(RevoluteDH(d=d[i], a=a[i], alpha=alpha[i], offset=-pi / 2))\n",
+        "d = [0.29, 0]\na = [0, 270]\nalpha = [-90, 0]\nback = [0, pi/2]\nL = [RevoluteDH(d=d[i], a=a[i] / 1000,"
+        " alpha=np.radians(alpha[i]), offset=-back[i]) for i in range(2)]\n",
+        f"{MATRIX}for i in range(1):\n    L.append(RevoluteDH(d=DH[i][1], a=DH[i][2], alpha=DH[i][3]))\n"
+        "L.append(RevoluteDH(d=DH[1][1], a=DH[1][2], alpha=DH[1][3], offset=DH[1][0]))\n",
+        "def row(theta, d, a, alpha):\n    return eye(4)\nx = [0.29, 0]\ny = [0, 0.27]\nz = [-pi/2, 0]\n"
+        "for i in range(2):\n    T = T @ row(q[i] - i * pi / 2, x[i], y[i], z[i])\n",
+        "l = [29, 27];\nDH = [0 l(1)/100 0 -pi/2;\n -pi/2 0 l(2)/100 0];\nfor i = 1:2\n"
+        "  L(i) = Link('d', DH(i,2), 'a', DH(i,3), 'alpha', DH(i,4), 'offset', DH(i,1));\nend\n",
+    ],
+)
+def test_links_are_what_a_program_makes_of_its_lists(tmp_path, text):
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+@pytest.mark.parametrize(
     "put_in",
     [
         "DH(:,1) = DH(:,1) + q_deg(:);",
@@ -717,6 +733,36 @@ def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text, end):
 def test_values_of_joints_may_be_put_into_a_matrix(tmp_path, put_in):
     content, _ = read(tmp_path, f"% theta d a alpha sigma offset\n{IN_MATLAB}{put_in}\n")
     assert len(content.dh.rows) == 2
+
+
+ROW = "def dh(theta, d, a, alpha):\n  pass\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "theta1 = q1\ntheta2 = q2 - pi/2\nT1 = dh(theta1, 0.29, 0, -pi/2)\nT2 = dh(theta2, 0, 0.27, 0)\n",
+        "theta2 = q[1] - pi/2\nT1 = dh(q[0], 0.29, 0, -pi/2)\nT2 = dh(theta2, 0, 0.27, 0)\n",
+        f"{MATRIX}for i in range(2):\n  theta = q[i] + DH[i][0]\n  T = T @ dh(theta, DH[i][1], DH[i][2], DH[i][3])\n",
+        f"{MATRIX}for row in DH:\n  off, d, a, alpha = row\n  T = T @ dh(q + off, d, a, alpha)\n",
+    ],
+)
+def test_what_a_program_adds_to_a_joints_variable_is_its_offset(tmp_path, text):
+    content, _ = read(tmp_path, ROW + text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "theta2 = theta2 - pi/2\nT1 = dh(theta1, 0.29, 0, -pi/2)\nT2 = dh(theta2, 0, 0.27, 0)\n",
+        "theta = q + np.array([0, -pi/2])\nT1 = dh(theta[0], 0.29, 0, -pi/2)\nT2 = dh(theta[1], 0, 0.27, 0)\n",
+        "q[1] = q[1] - pi/2\nT1 = dh(q[0], 0.29, 0, -pi/2)\nT2 = dh(q[1], 0, 0.27, 0)\n",
+    ],
+)
+def test_a_program_that_turns_its_joints_itself_is_asked_back(tmp_path, text):
+    with pytest.raises(InputError, match="changes theta"):
+        read(tmp_path, ROW + text)
 
 
 def test_theta_of_kdl_is_a_constant_whatever_its_name(tmp_path):
@@ -744,21 +790,15 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
     ("text", "names"),
     [
         (f"{LINES}L = []\nfor i in range(1):\n    L.append({LINK})\n", "of a loop"),
-        (f"{LINES}L = [RevoluteDH(d=1)]\nfor i in range(1, 2):\n    L.append({LINK})\n", "of a loop"),
         (f"{LINES}L = [{LINK} for i in reversed(range(2))]\n", "of a loop"),
         (f"{LINES}L = []\nfor i in range(2):\n    if i:\n        L.append({LINK})\n", "of a loop"),
         (f"{LINES}L = []\n{2 * f'for i in range(2):{chr(10)}    L.append({LINK}){chr(10)}'}", "of a loop"),
-        (f"{LISTS}L = [RevoluteDH(d=d[i], a=a[i], alpha=alpha[i], offset=-off[i]) for i in range(2)]\n", "of a loop"),
-        (f"{RECORDS}L = [RevoluteDH(d=p['a'], a=p['d'], alpha=p['alpha']) for p in dh]\n", "of a loop"),
-        (f"{LINES}L = [RevoluteDH(d=d[i], a=a[i], alpha=pi / 2) for i in range(2)]\n", "of a loop"),
-        (f"{RECORDS}L = [RevoluteDH(d=p['d'], a=p['a'], alpha=p['alpha']) for p in dh]\n", "of a loop"),
-        (f"{MATRIX}DH[1][2] = 0.5\nL = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH]\n", "of a loop"),
-        (f"{MATRIX}L = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH[:1]]\n", "of a loop"),
+        (f"{LINES}offset = [0, -pi/2]\nL = [{LINK} for i in range(2)]\n", "'offset' may be offsets"),
         (
-            f"{MATRIX}for i in range(1):\n    L.append(RevoluteDH(d=DH[i][1], a=DH[i][2], alpha=DH[i][3]))\n"
-            "L.append(RevoluteDH(d=DH[1][1], a=DH[1][2], alpha=DH[1][3]))\n",
-            "of a loop",
+            f"{MATRIX}DH[1][2] = 0.5\nL = [RevoluteDH(d=r[1], a=r[2], alpha=r[3], offset=r[0]) for r in DH]\n",
+            "changes 'DH'",
         ),
+        (f"{MATRIX}L = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH[:1]]\n", "of a loop"),
         (f"{IN_MATLAB}DH(:,4) = DH(:,4)*pi/180;\nfor i=1:2\nL(i) = Link([DH(i,:)]);\nend\n", "changes 'DH'"),
         (
             "N = 1;\nd=[0.29 0];\na=[0 0.27];\nal=[0 1];\nfor j=1:N\n L(j)=Link('d', d(j), 'a', a(j),"
