@@ -309,7 +309,8 @@ def _in_own_units(
     unit = length_unit or _length_unit(path, [] if slides else lengths, as_printed, unsaid)
     if unit != (length_unit or "mm"):
         yield f"the lengths, {max(lengths):g} at most, were read as {WORDS[unit]}; --length-unit mm if they are mm"
-    turned = {column for column in rows[0] if _unit_of(column) == "deg"} - own if rows else set()
+    as_degrees = angle_unit == "deg" or not rows
+    turned = set() if as_degrees else {column for column in rows[0] if _unit_of(column) == "deg"} - own
     if angle_unit is None:
         if as_printed and (wide := [row[c] for row in rows for c in turned if row[c] and abs(row[c]) > MAX_DEG]):
             doubt(None, "angles", f"{wide[0]:g} deg", "degrees that were converted twice", file=path)
@@ -324,8 +325,6 @@ def _in_own_units(
             turned = set()
         elif "alpha_deg" in without_unit and _in_radians(rows, "alpha_deg"):
             raise InputError(path, "column alpha", "small angles say no unit", "Give --angle-unit deg or rad")
-    elif angle_unit == "deg":
-        turned = set()
     for row in rows:
         for column, value in row.items():
             if column not in own and isinstance(value, float):

@@ -363,9 +363,12 @@ def _with_offsets(path: Path, text: str, grid: Grid) -> Grid:
             continue
         of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle"))
         if "theta" in quantities or not of_angles or f"- {listed[1]}" in text:
-            problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
-            place = f"line {text.count(chr(10), 0, listed.start()) + 1}"
-            raise InputError(path, place, problem, "Add them to theta, or remove that line")
+            raise InputError(
+                path,
+                f"line {text.count(chr(10), 0, listed.start()) + 1}",
+                f"'{listed[1]}' may be offsets of the table's joints, and no column holds them",
+                "Add them to theta, or remove that line",
+            )
         header, rows = [*header, "offset"], [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
     return [(line, header), *rows]
 
@@ -381,12 +384,20 @@ class _Table:
         of_words = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", of_words) if from_code else without_latex(plain(of_words))
         grid = _with_offsets(path, self.text, grid) if from_code else grid
+        # Lengths in cm alone, as the text says; those of mm and m are known by their sizes.
+        self.lengths = re.findall(
+            r"(?is)\A(?!.*(?:\bmm?\b|100\b|\.01\b|\bmet(?:er|re)s?\b)).*?\b(?:length|unit)s?\b[^\n.;]{0,20}(?:in|[:=(\[])\s?(cm)\b",
+            text,
+        )
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
         for line, cells in self.rows:
             if len(cells) != len(self.header):
-                problem = f"{len(cells)} fields where the header has {len(self.header)}: {', '.join(self.header)[:80]}"
-                remedy = "Correct the separators, or say what the fields of a row are: --column joint,theta,d,a,alpha"
-                raise InputError(path, f"row {line}", problem, remedy)
+                raise InputError(
+                    path,
+                    f"row {line}",
+                    f"{len(cells)} fields where the header has {len(self.header)}: {', '.join(self.header)[:80]}",
+                    "Correct the separators, or say what the fields of a row are: --column joint,theta,d,a,alpha",
+                )
         found = {k: own for k, name in enumerate(self.header) if (own := heading_of(name))}
         if "theta_deg" in self.header and not {"type", "offset_deg"} & set(self.header):
             found[self.header.index("theta_deg")] = Heading("theta", "deg", False)
@@ -702,7 +713,7 @@ class _Table:
         for row, each in enumerate(found):
             if each and each.unit and (each.unit in PER_MM) != length:
                 self._refuse(row, k, f"'{self.rows[row][1][k]}' is in {each.unit}", f"That is no unit of {name}")
-        units = sorted({each.unit for each in found if each and each.unit and each.number})
+        units = sorted({each.unit for each in found if each and each.unit and each.number}) or self.lengths * length
         bare = max((abs(each.number) for each in found if each and not each.unit), default=0.0)
         unit = self.headings[k].unit or (units[0] if len(units) == 1 else "")
         if unit == "grad":
@@ -721,8 +732,8 @@ class _Table:
 
     def _has_radians(self) -> bool:
         """Whether other columns are in radians, whose small angles are radians then."""
-        texts = [cell.lower() for _, cells in self.rows for cell in cells]
-        return any(own.unit == "rad" for own in self.headings.values()) or any("π" in x or "pi" in x for x in texts)
+        in_pi = (re.search("(?i)π|pi", cell) for _, cells in self.rows for cell in cells)
+        return any(own.unit == "rad" for own in self.headings.values()) or any(in_pi)
 
 
 def _in(amount: CellAmount, unit: str) -> float:

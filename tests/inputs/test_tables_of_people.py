@@ -404,6 +404,13 @@ def test_nothing_else_is(text):
         amount_of(text)
 
 
+@pytest.mark.parametrize(("said", "longest"), [("in cm", 1100), ("in cm and m", 110), ("of 7; reach 80 cm", 110)])
+def test_centimetres_that_the_text_says_are_no_millimetres(tmp_path, said, longest):
+    table = "| a | alpha | d | theta |\n|---|---|---|---|\n| 0 | 90 | 40 | q1 |\n| 110 | 0 | 0 | q2 |\n"
+    content, _ = read(tmp_path, f"D-H parameters, all lengths {said}:\n\n{table}")
+    assert content.dh.rows[1].a_mm == pytest.approx(longest)
+
+
 def test_names_given_by_each_other_end():
     with pytest.raises(ValueError, match="deep"):
         amount_of("a", {"a": "b", "b": "a"})
