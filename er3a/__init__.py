@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from er3a.kinematics.inverse import inverse as inverse
     from er3a.kinematics.numerical import solve as solve
     from er3a.kinematics.singularity import conditioning as conditioning
-    from er3a.kinematics.symbolic import arm_transform as arm_transform
-    from er3a.kinematics.symbolic import link_transforms as link_transforms
     from er3a.pipeline.viewing.plot import plot as plot
     from er3a.planning.class_follow import follow as follow
     from er3a.planning.moves import line as line
@@ -74,8 +72,6 @@ _PUBLIC = {
     "inverse_batch": "er3a.kinematics.batch",
     "solve": "er3a.kinematics.numerical",
     "conditioning": "er3a.kinematics.singularity",
-    "link_transforms": "er3a.kinematics.symbolic",
-    "arm_transform": "er3a.kinematics.symbolic",
     "pose": "er3a.planning.toolbox",
     "rpy": "er3a.planning.toolbox",
     "zyz": "er3a.planning.toolbox",

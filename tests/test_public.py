@@ -61,8 +61,6 @@ CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
     "inverse_batch": lambda robot, T: er3a.inverse_batch(robot, T[None]),
     "solve": lambda robot, T: er3a.solve(robot, T, restarts=0),
     "conditioning": lambda robot, T: er3a.conditioning(robot, Q),
-    "link_transforms": lambda robot, T: er3a.link_transforms(robot),
-    "arm_transform": lambda robot, T: er3a.arm_transform(robot),
     "follow": lambda robot, T: er3a.follow(robot, er3a.line(T, T, 1.0), np.array([0.0, 1.0])),
     "plot": lambda robot, T: er3a.plot(robot, Q),
     "clearance": lambda robot, T: er3a.clearance(robot, Q, None),

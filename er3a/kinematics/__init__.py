@@ -2,7 +2,7 @@
 metres.
 
 - From joints to poses: ``chain`` (the table as kernels take it), ``forward`` (and the Jacobian), ``table_batch`` (many
-  tables at once), ``symbolic`` (as formulas).
+  tables at once).
 - From poses to joints: ``inverse`` for one pose, ``batch`` for many. Arms with a spherical wrist are solved in closed
   form (``wrist_partitioned`` recognises them; ``closed_form``, over blocks of poses ``block_inverse``), others by the
   solver of their class (``by_class``, ``classes``). ``numerical`` iterates, ``neighbours`` finds poses near one without
