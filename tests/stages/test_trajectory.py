@@ -234,10 +234,10 @@ def test_strategies_are_listed_with_their_costs(results, name):
     assert paths["line_out"].strategy is None
     out = paths["line_out"]
     assert "out of reach from t = " in advice(out)
-    assert ("End at " in advice(out)) == (out.sound_end is not None)
+    assert ("End early, at " in advice(out)) == (out.sound_end is not None)
     last, met = paths["line_collides"].clear_until, paths["line_collides"].collisions[0]
     assert 0 < last.t_s < met.t0_s
-    assert f"End at {last.t_s:.4g} s" in advice(paths["line_collides"])
+    assert f"End early, at {last.t_s:.4g} s" in advice(paths["line_collides"])
     planned = paths["line_limits"]
     assert planned.strategy == "planned" or "limit" in advice(planned)
     if planned.strategy == "planned":

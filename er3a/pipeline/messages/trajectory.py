@@ -83,7 +83,7 @@ TEXTS = texts(
             "workpiece nearer{first:!}]"
         ),
         "advice.end": (
-            "End at {t_s:.4g} s, [{margin:.1f} mm clear after the stop][{margin:!}{left_s:.2f} s before faults]. "
+            "End early, at {t_s:.4g} s, [{margin:.1f} mm clear after the stop][{margin:!}{left_s:.2f} s before faults]. "
             "It is at ({xyz_mm:.1f, }) mm then; a stop takes {stop_s:.2f} s"
         ),
         "advice.slow_there": "Slow to {percent} % from {start:.2f} to {end:.2f} s",

@@ -95,6 +95,6 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     drawing = from_above(robot, results, study.scene(name, "capability"), placing.tray, LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     carried, _ = payload_key(known, robot)
-    answer = tr("Tray at {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
+    answer = tr("Tray centre: {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
     rest = tr("{where}. Payload {kg}.", where=placing.tray.where, kg=carried)
     return Tile(answer, rest, "pass", f"{name}/workspace.html", drawing=drawing)

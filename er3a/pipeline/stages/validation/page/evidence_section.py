@@ -103,7 +103,7 @@ def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
     steps = (
         (N_("Jog each joint: turns as drawn?"), ("direction",), "cell-direction1"),
         (N_("Read five poses, for {names}"), (*CONTINUOUS, "beta"), "poses"),
-        (N_("Enter limits and speeds from the controller"), LIMITS, "limits"),
+        (N_("Enter the controller's limits and speeds, run again"), LIMITS, "limits"),
     )
     rows = []
     for text, kinds, place in steps:

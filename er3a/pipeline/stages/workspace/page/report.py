@@ -100,14 +100,12 @@ def _key_of(void: model.VoidSummary, name: str) -> tuple[str, str]:
     low, high = (1000 * bound for bound in (void.volume_m3.lower, void.volume_m3.upper))
     sizes = [float(f"{(low + high) / 2:.{digits}g}") for digits in range(1, 9)]
     about = next((size for size in sizes if low <= size <= high), high)
-    return tr("about {size:g} L", size=about), tr("{what}: normal", what=name) if void.holds_shoulder else name
+    return tr("about {size:g} L", size=about), workspace_figures.if_normal(void, name)
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: which one, how large."""
-    note = with_unit(workspace_figures.litres(void), "L")
-    if void.holds_shoulder:
-        note = tr("{what}: normal", what=note)
+    note = workspace_figures.if_normal(void, with_unit(workspace_figures.litres(void), "L"))
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
 
 

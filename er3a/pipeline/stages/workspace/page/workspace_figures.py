@@ -189,6 +189,11 @@ def void_name(number_: int, void: model.VoidSummary) -> str:
     return tr(VOID_NAMES[void.kind], number=number_)
 
 
+def if_normal(void: model.VoidSummary, said: str) -> str:
+    """What is said of a void, with that it is normal where it is."""
+    return tr("{what}: normal", what=said) if void.holds_shoulder else said
+
+
 def void_labels(summary: model.WorkspaceSummary) -> list[Label]:
     """A word for each void all around axis 1, led to it from its side; a list says how large it is."""
     labels = []
@@ -198,5 +203,5 @@ def void_labels(summary: model.WorkspaceSummary) -> list[Label]:
         start = 1000 * np.array([across, void.centroid_m[2]])
         at = start + 1000 * summary.reach_m.furthest_from_axis * np.array(ASIDE)
         if void.kind == "enclosed":
-            labels.append(Label(void_name(number_, void), at, "hole", f"hole-{number_}", start, written_there=True))
+            labels.append(Label(if_normal(void, void_name(number_, void)), at, "hole", f"hole-{number_}", start, written_there=True))
     return labels
