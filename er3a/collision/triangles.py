@@ -429,13 +429,12 @@ def surface_distance(  # noqa: C901, PLR0912
     distance : m; below 0 where one is inside the other, 0 where they cross
     """
     _, first, last, disc = core
-    boxes, nb, convex = trees.slim, trees.root[b], trees.root[b] < 0
+    boxes, convex = trees.slim, trees.root[b] < 0
     count = last - first if convex else 3
     points, M, back = np.empty((3 + count, 3)), np.eye(3, 4), np.empty((3, 4))
-    stack, bound, seen, turn = np.empty((WAITING, 2), np.int64), np.empty(WAITING), np.empty((5, 3)), np.empty((4, 3))
+    stack, bound, seen, turn = np.empty((WAITING, 2), np.int64), np.empty(WAITING), np.zeros((5, 3)), np.empty((4, 3))
     if convex:
-        boxes, nb = np.zeros((1, 5, 3)), 0
-        _core_in_frame(T, core, points, boxes[0])
+        _core_in_frame(T, core, points, seen)
         within = _around(trees, trees.root[a], _moved(M, points, 3)) != 0
     else:
         within = _holds_probe(trees, S, T, b, a, back)
@@ -443,7 +442,7 @@ def surface_distance(  # noqa: C901, PLR0912
     if within and far <= 0:  # only whether they overlap is asked
         return 0.0
     axis, close, start, other = np.zeros(3), np.empty((2, 3)), int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
-    stack[0, 0], stack[0, 1], bound[0], height, best = trees.root[a], nb, 0.0, 1, max(far, 2 * TOUCHING)
+    stack[0, 0], stack[0, 1], bound[0], height, best = trees.root[a], trees.root[b], 0.0, 1, max(far, 2 * TOUCHING)
     while height:
         height -= 1
         n, m, kept = stack[height, 0], stack[height, 1], height
@@ -451,14 +450,14 @@ def surface_distance(  # noqa: C901, PLR0912
             continue
         deep_a, deep_b = trees.child[n, 0] >= 0, not convex and trees.child[m, 0] >= 0
         if deep_a or deep_b:  # the one with the larger side is opened
-            of_a = deep_a and not (deep_b and _side(boxes, m) >= _side(trees.slim, n))
-            if of_a:
+            of_a = deep_a and not (deep_b and _side(boxes, m) >= _side(boxes, n))
+            if not of_a:
+                _box_seen(boxes, n, back, seen)
+            elif not convex:
                 _box_seen(boxes, m, M, seen)
-            else:
-                _box_seen(trees.slim, n, back, seen)
             for side in range(2):
                 one, two = (trees.child[n, side], m) if of_a else (n, trees.child[m, side])
-                apart = _boxes_apart(trees.slim, one if of_a else two, seen, turn, best * best)
+                apart = _boxes_apart(boxes, one if of_a else two, seen, turn, best * best)
                 if apart < best * best:
                     stack[height, 0], stack[height, 1], bound[height] = one, two, apart
                     height += 1

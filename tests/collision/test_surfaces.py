@@ -15,6 +15,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.distances import FREE, free_between, which_overlap
 from er3a.collision.scene import Box, Mesh, Scene
 from er3a.collision.shapes import layout_of, link_frames
+from er3a.collision.triangles import tree_of
 from er3a.files.robot_writer import write_robot
 from er3a.formats.mesh_file import link_mesh
 
@@ -121,3 +122,13 @@ def test_surfaces_that_cross_overlap_though_no_corner_of_one_is_inside_the_other
     assert bodies.overlaps(np.zeros((1, 6))).all()
     assert bodies.min_distance(np.zeros((1, 6)))[0] < 0
     assert not bodies.free(np.zeros((1, 6))).any()
+
+
+def test_a_shell_inside_another_one_is_not_looked_for_in_other_bodies() -> None:
+    """A ball with a small one in it and one outside: the outer ones decide alone."""
+    balls = [trimesh.creation.icosphere(2, radius) for radius in (0.2, 0.05, 0.05)]
+    balls[1].apply_translation([0.05, 0, 0])
+    balls[2].apply_translation([0, 1, 0])
+    made = trimesh.util.concatenate(balls)
+    probes = tree_of(made.vertices, made.faces).probe
+    assert np.linalg.norm(probes - [[0, 0, 0], [0, 1, 0]], axis=1) == pytest.approx([0.2, 0.05])

@@ -2,8 +2,8 @@
  * Surfaces of triangles: a tree of boxes around them, and how far a body is from one, as er3a/collision/triangles.py has it.
  *
  * A surface is `{points, faces, shells, probes}`, m, in its link's frame: `faces` are rows of `points`, `shells` the number
- * of the closed shell of each face (0 for one that is not closed), `probes` a point of each shell. What does not cross a
- * surface, but has a point of one of its shells inside a closed one, is inside as a whole.
+ * of the closed shell of each face (0 for one that is not closed), `probes` a point of each shell that no other one holds.
+ * What does not cross a surface, but has a point of one of its shells inside a closed one, is inside as a whole.
  */
 
 import { IDENTITY, add, column, dot, moved, multiply, norm, scaled, subtract, turnedBack } from "er3a/algebra";
