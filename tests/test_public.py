@@ -525,3 +525,10 @@ def test_rows_left_out_are_counted():
     sheet = Sheet("Heading", ("a", "b"), (("1", "22"), ("333", "4")), 7, ("a fact",))
     assert as_text(sheet).splitlines() == ["Heading", "    a   b", "    1  22", "  333   4", "  ... 7 more", "  a fact"]
     assert "<p>... 7 more</p>" in as_html(sheet)
+
+
+def test_scenes_are_found_by_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert er3a.load_scene("table_and_post") == er3a.load_scene("data/scenes/table_and_post.yaml")
+    with pytest.raises(er3a.Er3aError, match="no such file"):
+        er3a.load_scene("nowhere")

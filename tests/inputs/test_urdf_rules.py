@@ -68,3 +68,19 @@ def test_a_rule_that_is_broken_is_named_at_its_line_and_no_other(tmp_path, code)
     (result,) = json.loads((tmp_path / "found.sarif").read_text())["runs"][0]["results"]
     region = result["locations"][0]["physicalLocation"]["region"]
     assert (result["ruleId"], region["startLine"]) == (code, place.line)
+
+
+def test_rules_are_looked_at_beside_what_looks_like_xacro(tmp_path):
+    """As a plugin's ``$(find package)``, which many URDFs have."""
+    plugin = "<gazebo><parameters>$(find pkg)/control.yaml</parameters></gazebo></robot>"
+    broken = urdf().replace('effort="98"', 'effort="0"', 1)
+    (path := tmp_path / "arm.urdf").write_text(broken.replace("</robot>", plugin))
+    assert [found.code for found, _ in lint(path)] == ["urdf_no_effort"]
+
+
+def test_a_check_without_a_file_is_that_of_the_study_in_the_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(app, ["check"]).exit_code == 2
+    assert CliRunner().invoke(app, ["new", ".", "--robot", "er3_600"]).exit_code == 0
+    done = CliRunner().invoke(app, ["check"])
+    assert (done.exit_code, done.output) == (0, ".: a study, in order\n")
