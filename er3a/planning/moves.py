@@ -23,7 +23,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Displayed
 from er3a.errors import Er3aError, PoseError
 from er3a.geometry.transforms import check_poses, exp_rotation, log_rotation, posed
 from er3a.numerics.arrays import Reals
@@ -121,8 +121,8 @@ class ToolPath(Protocol):
         """
 
 
-@dataclass(frozen=True, eq=False)
-class JointMove(ByValue):
+@dataclass(frozen=True, eq=False, repr=False)
+class JointMove(ByValue, Displayed):
     """All joints start and stop together.
 
     Attributes
@@ -168,8 +168,8 @@ class JointMove(ByValue):
         return polynomial_motion(self.joints, np.array([0.0, self.duration]), 5)
 
 
-@dataclass(frozen=True, eq=False)
-class Segment(ByValue, ABC):
+@dataclass(frozen=True, eq=False, repr=False)
+class Segment(ByValue, Displayed, ABC):
     """What a :class:`Line` and an :class:`er3a.planning.sequences.Arc` of the tool share.
 
     Attributes
@@ -314,7 +314,7 @@ class Segment(ByValue, ABC):
         return ((1, self.rotation / np.pi),) if self.half_turn else ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Line(Segment):
     """A straight line of the tool; ``translation`` (3,), m, leads from start to end in the base frame."""
 

@@ -27,7 +27,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Displayed
 from er3a.errors import PathError, PoseError
 from er3a.geometry.transforms import check_poses, exp_rotation, posed
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -49,7 +49,7 @@ from er3a.planning.profiles import (
 ON_A_LINE = 1e-6  # rad; three points this near to a straight line fix no circle
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Arc(Segment):
     """A circular arc of the tool point.
 
@@ -242,8 +242,8 @@ ZERO_LENGTH = 1e-12  # m; shorter segments are left out
 RUNS_ON = 1e-9  # relative difference of twists below which a corner is none
 
 
-@dataclass(frozen=True, eq=False)
-class SegmentPath(ByValue):
+@dataclass(frozen=True, eq=False, repr=False)
+class SegmentPath(ByValue, Displayed):
     """A sequence as a :class:`er3a.planning.moves.ToolPath`.
 
     Attributes
