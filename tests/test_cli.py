@@ -71,7 +71,6 @@ def test_a_machine_at_its_limits_is_one_line_and_exit_code_2(monkeypatch, capsys
         ("run --fail-on maybe", "'maybe' is not one of 'caution', 'fail'"),
         ("verdicts --bogus", "No such option: --bogus"),
         ("chek", "No such command 'chek'"),
-        ("check", "Missing argument"),
         ("compute validation", "Missing argument"),
         ("program write x --language perl --robot er3_600", "'perl' is not one of 'krl'"),
         ("import-urdf x --output", "requires an argument"),

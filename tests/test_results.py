@@ -93,7 +93,7 @@ def test_results_come_back_as_written(tmp_path, study):
         replace(SUMMARY, verdict=Verdict("pass", fact("made.solid", apart_from=fact("made.hollow", volume_m3=1.5)))),
     )
     stored = read_results(tmp_path, MadeResults)
-    assert (stored.robot, stored.stage, stored.status) == ("er3_600", "workspace", "pass")
+    assert (stored.robot, stored.stage, stored.results.summary.verdict.status) == ("er3_600", "workspace", "pass")
     assert stored.results.summary.verdict.finding == fact("made.solid", apart_from=fact("made.hollow", volume_m3=1.5))
     assert stored.results.summary.figures == SUMMARY.figures
     assert stored.results.rows == ROWS
