@@ -83,8 +83,8 @@ TEXTS = texts(
             "workpiece nearer{first:!}]"
         ),
         "advice.end": (
-            "End early, at {t_s:.4g} s, [{margin:.1f} mm clear after the stop][{margin:!}{left_s:.2f} s before faults]. "
-            "It is at ({xyz_mm:.1f, }) mm then; a stop takes {stop_s:.2f} s"
+            "End early, at {t_s:.4g} s, [{margin:.1f} mm clear after the stop][{margin:!}{left_s:.2f} s before faults]"
+            ". It is at ({xyz_mm:.1f, }) mm then; a stop takes {stop_s:.2f} s"
         ),
         "advice.slow_there": "Slow to {percent} % from {start:.2f} to {end:.2f} s",
         "advice.no_part": "Run no part of it",

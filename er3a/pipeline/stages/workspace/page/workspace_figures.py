@@ -203,5 +203,6 @@ def void_labels(summary: model.WorkspaceSummary) -> list[Label]:
         start = 1000 * np.array([across, void.centroid_m[2]])
         at = start + 1000 * summary.reach_m.furthest_from_axis * np.array(ASIDE)
         if void.kind == "enclosed":
-            labels.append(Label(if_normal(void, void_name(number_, void)), at, "hole", f"hole-{number_}", start, written_there=True))
+            said = if_normal(void, void_name(number_, void))
+            labels.append(Label(said, at, "hole", f"hole-{number_}", start, written_there=True))
     return labels
