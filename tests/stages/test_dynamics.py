@@ -111,7 +111,7 @@ def full(tmp_path_factory) -> tuple[Study, Stored[DynamicsResults]]:
 def test_a_robot_without_masses_has_no_data(tmp_path):
     study = load_study("config/small.yaml")
     found = computed(tmp_path, study, "er3_600")
-    assert found.status == "no_reference"
+    assert found.results.summary.verdict.status == "no_reference"
     verdict = found.results.summary.verdict.finding
     assert is_one(verdict, "dynamics.no_data")
     left = {each.reason: each.names for each in found.results.summary.assumed}
@@ -136,7 +136,7 @@ def test_an_arm_of_four_joints_without_masses_gets_page_and_recording(tmp_path):
     (tmp_path / "study.yaml").write_text(yaml.safe_dump(study | {"robots": {"arm": entry}}))
     of_scara = load_study(tmp_path / "study.yaml")
     found = computed(tmp_path, of_scara, "arm")
-    assert found.status == "no_reference"
+    assert found.results.summary.verdict.status == "no_reference"
     for view, name in ((report, "page.html"), (record, "recording.rrd")):
         view(of_scara, found, tmp_path / name)
         assert (tmp_path / name).stat().st_size > 1000
@@ -146,7 +146,7 @@ def test_an_arm_of_four_joints_without_masses_gets_page_and_recording(tmp_path):
 def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
     summary = bare.results.summary
     verdict = summary.verdict.finding
-    assert (bare.status, verdict.code) == ("no_reference", "dynamics.no_limits")
+    assert (bare.results.summary.verdict.status, verdict.code) == ("no_reference", "dynamics.no_limits")
     assert verdict.missing_links == (6,)
     assert verdict.grade == "export"
     assert summary.findings == (fact("missing_link", link=6, singular=True),)
@@ -178,7 +178,7 @@ def test_within_the_limits_it_fits(full):
     found = full[1]
     summary = found.results.summary
     verdict = summary.verdict.finding
-    assert (found.status, verdict.code) == ("pass", "dynamics.fits"), say(verdict)
+    assert (found.results.summary.verdict.status, verdict.code) == ("pass", "dynamics.fits"), say(verdict)
     assert verdict.tightest.params == vars(summary.uses[0])
     assert [use.ratio for use in summary.uses] == sorted((use.ratio for use in summary.uses), reverse=True)
     assert {use.quantity for use in summary.uses} == {"peak", "rms", "holding", "payload", "moment", "inertia"}
@@ -235,7 +235,11 @@ def test_limits_that_are_guessed_settle_nothing(full, tmp_path, group, need):
 
     found = computed(tmp_path, a_study(tmp_path, guessed, entry={"payload": CLAIM | {"body": LOAD}}, kept=ONE))
     summary = found.results.summary
-    assert (full[1].status, found.status, summary.verdict.finding.unknown) == ("pass", "caution", (need,))
+    assert (
+        full[1].results.summary.verdict.status,
+        found.results.summary.verdict.status,
+        summary.verdict.finding.unknown,
+    ) == ("pass", "caution", (need,))
     left = {each.reason: each.names for each in summary.assumed}
     if group == "drives":
         assert left["drives_guess"] == ()
@@ -289,7 +293,11 @@ def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):
 
     found = computed(tmp_path, a_study(tmp_path, change, entry={"payload": CLAIM | {"body": LOAD}}, kept=ONE))
     verdict = found.results.summary.verdict.finding
-    assert (found.status, verdict.code, verdict.unknown) == ("caution", "dynamics.marginal", ("friction",))
+    assert (found.results.summary.verdict.status, verdict.code, verdict.unknown) == (
+        "caution",
+        "dynamics.marginal",
+        ("friction",),
+    )
     assert "loads, ratings or paths are left out" in say(verdict)
     assert Open("friction", ("J4",)) in found.results.summary.assumed
 
@@ -385,7 +393,7 @@ def test_a_wrist_of_which_no_moment_is_known_is_compared_by_its_payload_alone(tm
     found = computed(tmp_path, study)
     rated = [use for use in found.results.summary.uses if use.quantity in ("payload", "moment", "inertia")]
     assert [(use.quantity, use.asked) for use in rated] == ([("payload", 1.5)] if wrist_load else [])
-    assert found.status == ("fail" if wrist_load else "caution")
+    assert found.results.summary.verdict.status == ("fail" if wrist_load else "caution")
 
 
 @pytest.mark.long
@@ -394,7 +402,7 @@ def test_beyond_the_limits_it_is_an_overload(tmp_path, full):
     beyond = computed(tmp_path, study)
     for found, status, code in ((beyond, "fail", "dynamics.overload"), (full[1], "pass", "dynamics.fits")):
         verdict = found.results.summary.verdict.finding
-        assert (found.status, verdict.code) == (status, code)
+        assert (found.results.summary.verdict.status, verdict.code) == (status, code)
         assert verdict.beyond == sum(use.ratio > 1 for use in found.results.summary.uses)
 
 
@@ -405,7 +413,10 @@ def test_what_only_the_tolerances_carry_beyond_a_limit_is_marginal(tmp_path, ful
     assert tightest < widest
     study = a_study(tmp_path, limited((tightest + widest) / 2), entry={"payload": CLAIM | {"body": LOAD}})
     found = computed(tmp_path, study)
-    assert (found.status, found.results.summary.verdict.finding.code) == ("caution", "dynamics.marginal")
+    assert (found.results.summary.verdict.status, found.results.summary.verdict.finding.code) == (
+        "caution",
+        "dynamics.marginal",
+    )
 
 
 @pytest.mark.long
@@ -416,7 +427,7 @@ def test_doubtful_masses_are_no_pass(tmp_path):
 
     found = computed(tmp_path, a_study(tmp_path, change, kept=ONE))
     verdict = found.results.summary.verdict.finding
-    assert (found.status, verdict.doubts) == ("caution", 1)
+    assert (found.results.summary.verdict.status, verdict.doubts) == ("caution", 1)
     assert [each.code for each in found.results.summary.findings] == ["centre_outside"]
 
 

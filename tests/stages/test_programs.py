@@ -264,7 +264,7 @@ def test_a_file_without_programs_is_no_reference_and_has_a_page(study, tmp_path)
     empty = with_entry(study, programs=str(listed))
     run.compute("programs", empty, "er3a_c60", tmp_path / "found")
     found = read_results(tmp_path / "found", RESULTS)
-    assert found.status == "no_reference"
+    assert found.results.summary.verdict.status == "no_reference"
     report(empty, found, tmp_path / "programs.html")
     record(empty, found, tmp_path / "programs.rrd")
 
