@@ -19,7 +19,7 @@ from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
-from er3a.pipeline.stages.trajectory.page.played import faults
+from er3a.pipeline.stages.trajectory.page.played import faults, safe_end
 from er3a.pipeline.stages.workspace.page.tray import found_by
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, all_caught
@@ -40,8 +40,12 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
     judged = found_by(stored, "trajectory")
     known = {fault.name: fault for fault in faults(judged.results)} if judged else {}
-    paths = judged.results.summary.paths if judged else ()
-    ends = {path.name: path.clear_until for path in paths if path.clear_until}
+    checked = judged.results if judged else None
+    ends = (
+        {each.name: end for each in checked.summary.paths for end in safe_end(each, checked.clearance)}
+        if checked
+        else {}
+    )
     answer = _answer(summary, closest, unreached, known)
     render_stage(
         study,

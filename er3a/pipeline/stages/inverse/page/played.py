@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from er3a.finding import Finding, is_one
@@ -43,7 +45,14 @@ def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> 
         events.append(PlayedEvent(1.0, 1.0 + SHOWN_S, outcome_word("reached"), "plain"))
     marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
     if near and near.shifted_to_mm and near.least_shift_mm:
-        marks.append(_line(near.shifted_to_mm, target.xyz_mm, short_of(near.least_shift_mm), len(q)))
+        far = with_unit(fixed(near.least_shift_mm, 0), "mm")
+        events[1:] = [PlayedEvent(1.0, 1.0 + SHOWN_S, tr("reached after moving the part {far}", far=far), "plain")]
+        marks = [
+            _line(target.xyz_mm, target.xyz_mm, target.name, 1),
+            _line(near.shifted_to_mm, target.xyz_mm, short_of(near.least_shift_mm), 1),
+            replace(_line(near.shifted_to_mm, near.shifted_to_mm, target.name, 2), t0=1.0),
+            replace(_line(target.xyz_mm, near.shifted_to_mm, "", 2), t0=1.0),
+        ]
     t = np.arange(len(q))[:, None] + [0.0, SHOWN_S]
     return PlayedMotion(
         target.name, "", t.ravel(), np.repeat(q, 2, axis=0), events, marks, ghosts=list(q[: min(MAX_GHOSTS, len(rows))])

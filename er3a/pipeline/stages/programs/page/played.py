@@ -47,7 +47,12 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     motions = []
     for program in worst_first(results):
         rows = results.motion.take(results.motion.program == program.name)
-        events = [PlayedEvent(t0, t1, tr("line {line}", line=line), "plain") for line, _, t0, t1 in stretches(rows)]
+        own = results.instructions.take(results.instructions.program == program.name)
+        clear = {line: float(np.fmin.reduce(own.clearance_mm[own.line == line])) for line in own.line.tolist()}
+        events = [
+            PlayedEvent(t0, t1, _line_text(line, clear.get(line, np.nan)), "plain")
+            for line, _, t0, t1 in stretches(rows)
+        ]
         for each in sorted(program.findings, key=cause_first):
             if each.program_s is not None:
                 events += _found_event(program, each, rows)
@@ -65,6 +70,12 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     return motions
 
 
+def _line_text(line: int, clear_mm: float) -> str:
+    """A line while it is carried out, and how clear the arm then is, where that was measured."""
+    clear = tr("{far} mm clear", far=fixed(clear_mm, 0)) if clear_mm >= 0 else ""
+    return joined([tr("line {line}", line=line), clear], ", ")
+
+
 def _safe_s(program: ProgramSummary) -> float:
     """The last moment (s) before anything is wrong with a program; below 0 where there is none."""
     wrong = [each.program_s or 0.0 for each in program.findings if WEIGHTS[each.level] != "plain"]
@@ -77,9 +88,7 @@ def _missed(program: ProgramSummary, rows: ProgramMotion) -> list[Mark]:
     for found in program.findings:
         if place := found.finding.params.get("target_m"):
             tip = rows.xyz_mm[np.searchsorted(rows.t_s, (found.program_s or 0.0) - MOMENT)] / 1000
-            far = fixed(1000 * float(np.linalg.norm(tip - place)), 0)
-            text = tr("target, {far} mm off", far=far)
-            marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(place), text))
+            marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(place), tr("not reachable")))
     return marks
 
 
