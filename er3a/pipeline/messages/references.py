@@ -158,9 +158,9 @@ def _(found: Finding) -> str:
 
 def entry_word(entry: str) -> str:
     """An entry's name as the table's columns have it, such as ``α6``."""
-    kind = entry.rstrip("0123456789")
-    gap = " " if kind.isalpha() and len(kind) > 1 else ""
-    return {"alpha": "α", "beta": "β"}.get(kind, kind + gap) + entry[len(kind) :]
+    for spelled, written in {"alpha": "α", "beta": "β", "offset": "offset ", "direction": "direction "}.items():
+        entry = entry.replace(spelled, written)
+    return entry
 
 
 @says("measure_angle", "measure_length")

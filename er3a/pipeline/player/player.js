@@ -318,8 +318,7 @@ function withCursors(figure) {
 /** Scrolls a listing to the row that is shown of it: into the middle, or to its top where it has no room; its first row is whole. */
 function listed(row) {
   const box = row.closest(".listing");
-  const tops = box && [...row.closest("table").rows].map(({ offsetTop }) => offsetTop).filter((top) => top <= box.scrollHeight - box.clientHeight);
-  box?.scrollTo(0, tops.find((top) => top >= row.offsetTop - Math.max(0, (box.clientHeight - row.offsetHeight) / 2)) ?? tops.at(-1));
+  box?.scrollTo(0, [...row.closest("table").rows].map(({ offsetTop }) => offsetTop).findLast((top) => top <= Math.min(box.scrollHeight - box.clientHeight, row.offsetTop - Math.max(0, (box.clientHeight - row.offsetHeight) / 2))));
 }
 
 /** Keeps the player in sight below what the reader points at, whose lower edge is at ``edge`` in the window. */

@@ -80,7 +80,9 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
 MAX_USES = 12
 NONE = "–"
 SEEN = 0.02  # of the longest bar, below which one is a speck
-WITHOUT = words({"load": "load", "friction": "friction", "rotor_inertias": "rotors", "link_masses": "mass of link"})
+WITHOUT = words(
+    {"load": "load", "friction": "friction", "rotor_inertias": "rotors", "link_masses": "mass of link {links}"}
+)
 
 
 def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) -> None:
@@ -171,9 +173,7 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         name, held = holding_name(motor.joint), summary.holding[motor.joint - 1]
         still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), longest))
     left = [
-        joined([tr(WITHOUT[each.reason]), joined(each.names, " + ") if each.reason == "link_masses" else ""], " ")
-        for each in summary.assumed
-        if each.reason in WITHOUT
+        tr(WITHOUT[each.reason], links=joined(each.names, " + ")) for each in summary.assumed if each.reason in WITHOUT
     ]
     todo = tr("enter the motors' peak torques in {file}.", file=file)
     return Answer(
@@ -249,12 +249,9 @@ def _motors(motors: Sequence[model.MotorNeed]) -> list[list[str]]:
     return [
         [
             _label(motor.joint, motor.unit),
-            *(
-                fixed(value, torque) if motor.peak or motor.holding else NONE
-                for value in (motor.peak, motor.rms, motor.holding)
-            ),
+            *(fixed(value, torque) if value else NONE for value in (motor.peak, motor.rms, motor.holding)),
             fixed(motor.speed, 1),
-            fixed(motor.power_w, power) if motor.peak or motor.holding else NONE,
+            fixed(motor.power_w, power) if motor.power_w else NONE,
             *(
                 NONE if value is None else number(value, 3)
                 for value in (motor.motor_torque, motor.motor_rpm, motor.rated_limit, motor.peak_limit)

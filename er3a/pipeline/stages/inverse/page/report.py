@@ -9,11 +9,11 @@ from typing import Any, Literal
 import numpy as np
 from markupsafe import Markup
 
-from er3a.finding import Finding, is_one
+from er3a.finding import is_one
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import NEAREST_RULE
-from er3a.pipeline.messages.kinematics import branch_word, limited
+from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, listed, say
 from er3a.pipeline.player.motions import address_of
@@ -110,7 +110,7 @@ def _singular(target: model.TargetResult) -> bool:
 def _row(target: model.TargetResult) -> ListRow:
     """A target: how clear the chosen solution is, or what it came to, and what to do."""
     near = target.neighbours
-    note = _missed(target) or outcome_word(target.outcome)
+    note = short_of(near.least_shift_mm) if near and near.least_shift_mm else outcome_word(target.outcome)
     if target.clearance:
         note = tr("{far} mm clear", far=fixed(target.clearance.least_mm, 1))
     mark: Literal["pass", "caution", "fail"] = "fail"
@@ -125,12 +125,6 @@ def _row(target: model.TargetResult) -> ListRow:
     return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
 
 
-def _missed(target: model.TargetResult) -> str:
-    """By how much the arm does not get to a target, where that is known: one number for all of the first screen."""
-    near = target.neighbours
-    return short_of(near.least_shift_mm) if near and near.least_shift_mm else ""
-
-
 def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> dict[str, Any]:
     branches = best_of_branches(rows)
     cells = _branch_rows(branches)
@@ -140,7 +134,7 @@ def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows)
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),
         reason=say(target.reason),
-        short=_missed(target) or say(target.reason),
+        short=_row(target).note,
         clearance=_clearance(target),
         advice=listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
@@ -165,17 +159,10 @@ def _solutions_listed(
             stretch(target, k, k + SHOWN_S),
             moment(target, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
             shares[k].clip(-OVER, 1 + OVER).tolist(),
-            _limits_named(branches.refusal[k]) or _outcome(branches, k, _move(branches, k)),
+            _outcome(branches, k, _move(branches, k)),
         )
         for k in range(len(branches))
     ]
-
-
-def _limits_named(refusal: Finding | None) -> str:
-    """Which joints leave their limits; empty where it is not that."""
-    if not is_one(refusal, "limits_exceeded"):
-        return ""
-    return joined(map(limited, refusal.joints), ", ")
 
 
 def _move(branches: model.SolutionRows, k: int) -> str:

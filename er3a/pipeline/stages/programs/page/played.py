@@ -10,6 +10,7 @@ import numpy as np
 
 from er3a.collision.pairs import names_of
 from er3a.finding import Finding, is_one
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.numbers import fixed
@@ -48,19 +49,14 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     for program in worst_first(results):
         rows = results.motion.take(results.motion.program == program.name)
         own = results.instructions.take(results.instructions.program == program.name)
-        clear = {line: float(np.fmin.reduce(own.clearance_mm[own.line == line])) for line in own.line.tolist()}
         events = [
-            PlayedEvent(t0, t1, _line_text(line, clear.get(line, np.nan)), "plain")
+            PlayedEvent(t0, t1, _line_text(line, own.clearance_mm[own.line == line]), "plain")
             for line, _, t0, t1 in stretches(rows)
         ]
         for each in sorted(program.findings, key=cause_first):
             if each.program_s is not None:
                 events += _found_event(program, each, rows)
         if len(rows):
-            safe = _safe_s(program)
-            events.insert(
-                0, PlayedEvent(safe, safe, tr("nothing wrong up to here: {time}", time=_seconds(safe)), "plain")
-            )
             motions.append(
                 PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events, _missed(program, rows))
             )
@@ -70,10 +66,10 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     return motions
 
 
-def _line_text(line: int, clear_mm: float) -> str:
+def _line_text(line: int, clear_mm: Reals) -> str:
     """A line while it is carried out, and how clear the arm then is, where that was measured."""
-    clear = tr("{far} mm clear", far=fixed(clear_mm, 0)) if clear_mm >= 0 else ""
-    return joined([tr("line {line}", line=line), clear], ", ")
+    clear = [tr("{far} mm clear", far=fixed(far, 0)) for far in clear_mm[clear_mm >= 0]]
+    return joined([tr("line {line}", line=line), *clear[:1]], ", ")
 
 
 def _safe_s(program: ProgramSummary) -> float:

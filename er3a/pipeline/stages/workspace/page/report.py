@@ -107,8 +107,7 @@ def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: which one, how large."""
     note = workspace_figures.if_normal(void, with_unit(workspace_figures.litres(void), "L"))
     if not void.holds_shoulder:
-        limits = void.cause.params.get("limits", ())
-        note = joined([note, joined(map(FORMATS["limit"], limits), ", ")], tr(": "))
+        note = joined([note, *map(FORMATS["limit"], void.cause.params.get("limits", ()))], ", ")
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
 
 
