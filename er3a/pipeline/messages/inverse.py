@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding
-from er3a.pipeline.language import N_, as_text, tr, with_unit, words
+from er3a.pipeline.language import N_, tr, words
 from er3a.pipeline.messages.kinematics import limited
 from er3a.pipeline.messages.say import WORDS, joined, texts
 
@@ -61,7 +61,6 @@ WORDS["inverse.collisions"] = words({True: "collisions", False: "self-collision"
 
 
 def limits_in_short(found: Finding) -> str:
-    """Which limits are left and by how much, for a cell of a table."""
+    """Which limits are left, for a cell of a table."""
     sides = {"above": tr("over"), "below": tr("under")}
-    beyond = (with_unit(as_text(each.excess.value, ".1f"), each.excess.unit) for each in found.joints)
-    return joined((f"{limited(each)} {text} {sides[each.side]}" for each, text in zip(found.joints, beyond)), ", ")
+    return joined((f"{limited(each)} {sides[each.side]}" for each in found.joints), ", ")

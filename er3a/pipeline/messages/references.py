@@ -156,9 +156,16 @@ def _(found: Finding) -> str:
     return say_as(found, start=start, motion=motion)
 
 
+def entry_word(entry: str) -> str:
+    """An entry's name as the table's columns have it, such as ``α6``."""
+    for spelled, written in {"alpha": "α", "beta": "β", "offset": "offset ", "direction": "direction "}.items():
+        entry = entry.replace(spelled, written)
+    return entry
+
+
 @says("measure_angle", "measure_length")
 def _(found: Finding) -> str:
     mm = is_one(found, "measure_length")
     half_width = Amount(found.half_width_mm, "mm") if mm else Amount(found.half_width_deg, "deg")
     what = tr(MEASURED[found.column], joint=found.joint, before=found.joint - 1)
-    return sentence("measure_entry", own_entry=found.entry, half_width=half_width, what=what)
+    return sentence("measure_entry", own_entry=entry_word(found.entry), half_width=half_width, what=what)

@@ -318,7 +318,7 @@ function withCursors(figure) {
 /** Scrolls a listing to the row that is shown of it: into the middle, or to its top where it has no room; its first row is whole. */
 function listed(row) {
   const box = row.closest(".listing");
-  box?.scrollTo(0, [...row.closest("table").rows].map(({ offsetTop }) => offsetTop).find((top) => top >= row.offsetTop - Math.max(0, (box.clientHeight - row.offsetHeight) / 2)));
+  box?.scrollTo(0, [...row.closest("table").rows].map(({ offsetTop }) => offsetTop).findLast((top) => top <= Math.min(box.scrollHeight - box.clientHeight, row.offsetTop - Math.max(0, (box.clientHeight - row.offsetHeight) / 2))));
 }
 
 /** Keeps the player in sight below what the reader points at, whose lower edge is at ``edge`` in the window. */

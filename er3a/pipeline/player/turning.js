@@ -3,8 +3,8 @@
  * layers out.
  */
 
-import { add, column, scaled, subtract } from "er3a/algebra";
-import { ARM, Space, alongArm, surface } from "er3a/space";
+import { add, column, dot, scaled, subtract } from "er3a/algebra";
+import { ARM, Space, alongArm, eyeOf, surface } from "er3a/space";
 import three from "er3a/three";
 
 const STEPS = 65535; // that the box is divided into
@@ -117,7 +117,7 @@ function draw() {
     space.keepClear([...Array(21).keys()].map((i) => add(scaled(from, 1 - i / 20), scaled(to, i / 20))), 0);
     space.word(text, add(scaled(from, 0.4), scaled(to, 0.6)), space.page.accent);
   }
-  for (const each of named) space.word(each.name, placeOf(each), each === shown ? space.page.accent : space.page[each.points ? "hole" : "ink"]);
+  for (const each of named) space.word(each.name, each.points?.reduce((a, b) => (dot(eyeOf(space).back, subtract(b, a)) > 0 ? b : a)) ?? placeOf(each), each === shown ? space.page.accent : space.page[each.points ? "hole" : "ink"]);
   for (const each of solids.slice(1).filter((each) => !each.address && isSeen(each))) space.names(each.parts.filter(({ visible }) => visible));
   space.end();
   place.toggleAttribute("data-drawn", true);

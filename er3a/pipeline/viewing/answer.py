@@ -134,7 +134,7 @@ def lengths(durations_s: Iterable[float]) -> list[float]:
 
 
 def judged(rows: Sequence[ListRow], repairable: Sequence[ListRow] = ()) -> list[Group]:
-    """Motions by what came of them, those that fail first; before these ``repairable`` ones: there is a way."""
+    """Motions by what came of them, those that fail first, then ``repairable`` ones: there is a way."""
     titles: dict[Mark, str] = {"fail": tr("Don't run as they are"), "caution": tr("Doubts"), "pass": tr("Pass")}
     groups = [Group(title, [row for row in rows if row.mark == mark]) for mark, title in titles.items()]
-    return [Group(tr("Can be repaired"), repairable), *groups]
+    return [*groups[:1], Group(tr("Can be repaired"), repairable), *groups[1:]]

@@ -717,11 +717,10 @@ const mark = (shown) => {
   fix.querySelector("b").textContent = lead;
   fix.querySelector("span").lastChild.data = ` ${advice}`;
   const link = fix.querySelector("a");
-  if (instead) link.href = instead;
+  if (instead) [link.href, link.textContent] = [instead, instead.includes("until=") ? WORDS.playUpTo : WORDS.show];
   link.hidden = !instead || (link.hash === shown.hash && !instead.includes("?")); // nothing else is there to be shown
 };
-// A row's own name; several may show one motion, each another moment of it.
-const nameOf = (row) => row.querySelector("b").textContent;
+// Several rows may show one motion, each another moment of it.
 const other = (row) => new URLSearchParams(row.dataset.instead?.split(/[?#]/)[1]).get("play"); // that it leads to instead
 const playing = (name, t) => rows.find((row) => row.dataset.play === name && row.dataset.t === t) ?? rows.find((row) => row.dataset.play === name) ?? rows.find((row) => name && other(row) === name);
 const choose = (row, play, t) => {
@@ -729,8 +728,9 @@ const choose = (row, play, t) => {
   keepInAddress({ play, t, until: "" }); // no place: who opens it sees the first screen
 };
 for (const row of rows) row.addEventListener("click", () => (row.dataset.play ? choose(row, row.dataset.play, row.dataset.t) : mark(row)));
+addEventListener("hashchange", () => rows.filter((row) => !row.dataset.play && row.hash === location.hash).forEach(mark)); // as by the one thing to do
 const [named, asked] = [addressed(), new URLSearchParams(location.search)];
-mark(playing(asked.get("play"), asked.get("t")) ?? rows.find((row) => nameOf(row) === named || row.hash === location.hash) ?? playing(named || document.querySelector(".player")?.dataset.opened) ?? rows[0]);
+mark(playing(asked.get("play"), asked.get("t")) ?? rows.find((row) => row.querySelector("b").textContent === named || row.hash === location.hash) ?? playing(named || document.querySelector(".player")?.dataset.opened) ?? rows[0]);
 const follow = ({ detail }) => rows.some((row) => row.ariaCurrent && row.dataset.play === detail) || choose(playing(detail), detail);
 addEventListener("player", () => addEventListener("motion", follow)); // the first one is not of the reader's choice
 

@@ -73,6 +73,8 @@ FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's hea
 }
 
 SCRIPT_WORDS = {
+    "show": N_("Show it"),
+    "playUpTo": N_("Play up to it"),
     "sort": N_("sort by this column"),
     "csv": N_("CSV"),
     "svg": N_("download"),

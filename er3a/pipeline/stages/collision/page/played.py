@@ -12,8 +12,6 @@ from er3a.pipeline.messages.say import sentence
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.collision.model import Closest, CollisionResults, PathClearances
-from er3a.pipeline.stages.trajectory.model import ClearUntil
-from er3a.pipeline.stages.trajectory.page.played import clear_at_end
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -21,9 +19,9 @@ MOMENT = 1e-6  # s
 TOUCHING = 1e-3  # mm: far above what is left where bodies first touch
 
 
-def motions(robot: Robot, results: CollisionResults, ends: Mapping[str, ClearUntil]) -> list[PlayedMotion]:
+def motions(robot: Robot, results: CollisionResults, ends: Mapping[str, PlayedEvent]) -> list[PlayedMotion]:
     """The paths, as far as the arm reaches them, with the line between the nearest points at each moment; ``ends``: up
-    to where those that meet something may be run."""
+    to where those that meet something may be run, as the page of paths says it."""
     motions = []
     for name in dict.fromkeys(results.paths.path.tolist()):
         own = results.paths.take(results.paths.path == name)
@@ -61,16 +59,19 @@ def _overlaps(rows: PathClearances) -> list[PlayedEvent]:
     starts = np.union1d(np.flatnonzero(label != np.roll(label, 1)), [0])
     ends = np.append(starts[1:], len(rows) - 1)
     return [
-        PlayedEvent(rows.t_s[i], rows.t_s[j - (label[j] == "")], _inside(bodies, far[i : j + 1].min()), "fail", bodies)
+        PlayedEvent(
+            rows.t_s[i], rows.t_s[j - (label[j] == "")], _inside(bodies, rows.take(np.arange(i, j + 1))), "fail", bodies
+        )
         for i, j in zip(starts, ends)
         if len(bodies := tuple(label[i].split("/"))) == 2
     ]
 
 
-def _inside(bodies: tuple[str, ...], clearance_mm: float) -> str:
-    """How deep a body gets into another one while they overlap."""
-    one, other = map(body_word, bodies)
-    return tr("{one} is up to {far} mm inside {other}", one=one, far=fixed(-clearance_mm, 1), other=other)
+def _inside(bodies: tuple[str, ...], rows: PathClearances) -> str:
+    """How deep a body gets into another one while they overlap, and when."""
+    (one, other), worst = map(body_word, bodies), int(rows.clearance_mm.argmin())
+    far, at = fixed(-rows.clearance_mm[worst], 1), fixed(rows.t_s[worst], 2)
+    return tr("{one} is up to {far} mm inside {other}, at {at} s", one=one, far=far, other=other, at=at)
 
 
 def _least(found: Closest) -> PlayedEvent:
@@ -78,13 +79,13 @@ def _least(found: Closest) -> PlayedEvent:
     return PlayedEvent(t, t, text, "plain")
 
 
-def nearest(rows: PathClearances, end: ClearUntil | None = None) -> list[Mark]:
+def nearest(rows: PathClearances, end: PlayedEvent | None = None) -> list[Mark]:
     """The nearest points, each pair shown until the next was measured; at the ``end`` that a path may have also how
     clear it is after the stop."""
     until = np.append(rows.t_s[1:], rows.t_s[-1:])
     until[-2:-1] -= MOMENT  # the last pair alone is shown at the end
     return [
-        Mark(t0, t1, start, other, _clearance(clearance, end if end and t0 <= end.t_s < t1 else None))
+        Mark(t0, t1, start, other, end.text if end and t0 <= end.t < t1 else _clearance(clearance))
         for t0, t1, start, other, clearance in zip(
             rows.t_s.tolist(),
             until.tolist(),
@@ -96,5 +97,5 @@ def nearest(rows: PathClearances, end: ClearUntil | None = None) -> list[Mark]:
     ]
 
 
-def _clearance(clearance_mm: float, end: ClearUntil | None = None) -> str:
-    return clear_at_end(clearance_mm, end) if end else tr("{clearance} mm", clearance=fixed(clearance_mm, 1))
+def _clearance(clearance_mm: float) -> str:
+    return tr("{clearance} mm", clearance=fixed(clearance_mm, 1))

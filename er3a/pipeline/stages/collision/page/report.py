@@ -14,12 +14,12 @@ from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.motions import Fault, at_rest, fix_of
+from er3a.pipeline.player.motions import Fault, PlayedEvent, at_rest, fix_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
-from er3a.pipeline.stages.trajectory.page.played import faults
+from er3a.pipeline.stages.trajectory.page.played import faults, safe_end
 from er3a.pipeline.stages.workspace.page.tray import found_by
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, all_caught
@@ -39,9 +39,12 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     # A path of which a part can't be reached is clear of nothing.
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
     judged = found_by(stored, "trajectory")
-    known = {fault.name: fault for fault in faults(judged.results)} if judged else {}
-    paths = judged.results.summary.paths if judged else ()
-    ends = {path.name: path.clear_until for path in paths if path.clear_until}
+    known, ends = dict[str, Fault](), dict[str, PlayedEvent]()
+    if judged:
+        known = {fault.name: fault for fault in faults(judged.results)}
+        ends = {
+            each.name: end for each in judged.results.summary.paths for end in safe_end(each, judged.results.clearance)
+        }
     answer = _answer(summary, closest, unreached, known)
     render_stage(
         study,

@@ -44,7 +44,8 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         colour = JOINTS[j % len(JOINTS)]
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
         torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
-        torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
+        seen = abs(rows.torque[:, j]).max() >= SEEN * abs(rows.torque).max()  # else it lies on the axis
+        torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}" if seen else None)
     torque.legend(ncols=6, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     torque.set_ylabel(axis_label(rows, "torque", unit))
     names = dict(
@@ -79,7 +80,9 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
 MAX_USES = 12
 NONE = "–"
 SEEN = 0.02  # of the longest bar, below which one is a speck
-WITHOUT = words({"load": "load", "friction": "friction", "rotor_inertias": "rotors", "link_masses": "some masses"})
+WITHOUT = words(
+    {"load": "load", "friction": "friction", "rotor_inertias": "rotors", "link_masses": "mass of link {links}"}
+)
 
 
 def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) -> None:
@@ -169,7 +172,9 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {path}", (path, t), longest, motor.peak_limit))
         name, held = holding_name(motor.joint), summary.holding[motor.joint - 1]
         still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), longest))
-    left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
+    left = [
+        tr(WITHOUT[each.reason], links=joined(each.names, " + ")) for each in summary.assumed if each.reason in WITHOUT
+    ]
     todo = tr("enter the motors' peak torques in {file}.", file=file)
     return Answer(
         headline,
@@ -244,9 +249,9 @@ def _motors(motors: Sequence[model.MotorNeed]) -> list[list[str]]:
     return [
         [
             _label(motor.joint, motor.unit),
-            *(fixed(value, torque) for value in (motor.peak, motor.rms, motor.holding)),
+            *(fixed(value, torque) if value else NONE for value in (motor.peak, motor.rms, motor.holding)),
             fixed(motor.speed, 1),
-            fixed(motor.power_w, power),
+            fixed(motor.power_w, power) if motor.power_w else NONE,
             *(
                 NONE if value is None else number(value, 3)
                 for value in (motor.motor_torque, motor.motor_rpm, motor.rated_limit, motor.peak_limit)

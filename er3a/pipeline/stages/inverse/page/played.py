@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from er3a.finding import Finding, is_one
@@ -32,18 +34,21 @@ def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> 
     rows : the best row of each branch, in the order in which they are shown
     """
     q = meant(robot, rows.q_deg if len(rows) else np.array([target.q_ref_deg]))
+    events = [_solution_event(rows, k) for k in range(len(rows))]
+    events = events or [PlayedEvent(0.0, SHOWN_S, outcome_word(target.outcome), "fail")]
+    marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
     near = target.neighbours if not len(rows) else None
-    if near and near.shifted_to_mm:
+    if near and near.shifted_to_mm and near.least_shift_mm:
         pose = transform(np.array(near.shifted_to_mm) / 1000, np.radians(target.rpy_deg))
         found = inverse(robot, pose, q[0])
         q = np.repeat(found.q[found.within_limits][:1] if found.within_limits.any() else q, 2, axis=0)
-    events = [_solution_event(rows, k) for k in range(len(rows))]
-    events = events or [PlayedEvent(0.0, SHOWN_S, outcome_word(target.outcome), "fail")]
-    if len(q) > len(events):
-        events.append(PlayedEvent(1.0, 1.0 + SHOWN_S, outcome_word("reached"), "plain"))
-    marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
-    if near and near.shifted_to_mm and near.least_shift_mm:
-        marks.append(_line(near.shifted_to_mm, target.xyz_mm, short_of(near.least_shift_mm), len(q)))
+        far = with_unit(fixed(near.least_shift_mm, 0), "mm")
+        events.append(PlayedEvent(1.0, 1.0 + SHOWN_S, tr("reached after moving the part {far}", far=far), "plain"))
+        marks += [
+            _line(near.shifted_to_mm, target.xyz_mm, short_of(near.least_shift_mm), 1),
+            replace(_line(near.shifted_to_mm, target.xyz_mm, "", 2), t0=1.0),
+            replace(_line(near.shifted_to_mm, near.shifted_to_mm, target.name, 2), t0=1.0),
+        ]
     t = np.arange(len(q))[:, None] + [0.0, SHOWN_S]
     return PlayedMotion(
         target.name, "", t.ravel(), np.repeat(q, 2, axis=0), events, marks, ghosts=list(q[: min(MAX_GHOSTS, len(rows))])

@@ -134,6 +134,7 @@ def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows)
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),
         reason=say(target.reason),
+        short=_row(target).note,
         clearance=_clearance(target),
         advice=listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],

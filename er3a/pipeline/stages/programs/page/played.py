@@ -10,6 +10,7 @@ import numpy as np
 
 from er3a.collision.pairs import names_of
 from er3a.finding import Finding, is_one
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.numbers import fixed
@@ -47,15 +48,15 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     motions = []
     for program in worst_first(results):
         rows = results.motion.take(results.motion.program == program.name)
-        events = [PlayedEvent(t0, t1, tr("line {line}", line=line), "plain") for line, _, t0, t1 in stretches(rows)]
+        own = results.instructions.take(results.instructions.program == program.name)
+        events = [
+            PlayedEvent(t0, t1, _line_text(line, own.clearance_mm[own.line == line]), "plain")
+            for line, _, t0, t1 in stretches(rows)
+        ]
         for each in sorted(program.findings, key=cause_first):
             if each.program_s is not None:
                 events += _found_event(program, each, rows)
         if len(rows):
-            safe = _safe_s(program)
-            events.insert(
-                0, PlayedEvent(safe, safe, tr("nothing wrong up to here: {time}", time=_seconds(safe)), "plain")
-            )
             motions.append(
                 PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events, _missed(program, rows))
             )
@@ -63,6 +64,12 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
             said = joined([in_few_words(say(each.finding)) for each in program.findings])
             motions.append(at_rest(robot, program.name, said, WEIGHTS[program.outcome]))
     return motions
+
+
+def _line_text(line: int, clear_mm: Reals) -> str:
+    """A line while it is carried out, and how clear the arm then is, where that was measured."""
+    clear = [tr("{far} mm clear", far=fixed(far, 0)) for far in clear_mm[clear_mm >= 0]]
+    return joined([tr("line {line}", line=line), *clear[:1]], ", ")
 
 
 def _safe_s(program: ProgramSummary) -> float:
@@ -77,9 +84,7 @@ def _missed(program: ProgramSummary, rows: ProgramMotion) -> list[Mark]:
     for found in program.findings:
         if place := found.finding.params.get("target_m"):
             tip = rows.xyz_mm[np.searchsorted(rows.t_s, (found.program_s or 0.0) - MOMENT)] / 1000
-            far = fixed(1000 * float(np.linalg.norm(tip - place)), 0)
-            text = tr("target, {far} mm off", far=far)
-            marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(place), text))
+            marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(place), tr("not reachable")))
     return marks
 
 

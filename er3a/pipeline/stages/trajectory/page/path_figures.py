@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 
 from er3a.finding import Finding
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
 from er3a.pipeline.viewing.figures import axis_label, new_figure
@@ -69,10 +68,6 @@ def nearness_picture(
     ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
     far = fixed(least.least_mm, 1)
     caption = tr("Least: {far} mm at {t:.2f} s, {pair}.", far=far, t=least.t_s, pair=say(least.between))
-    if path and path.sound_end:
-        end = path.sound_end.t_s
-        until = float(np.interp(end, rows.t_s, rows.clearance_mm))
-        caption = joined([caption, tr("At {t:.2f} s: {far} mm.", t=end, far=fixed(until, 1))], " ")
     ax.set_xlim(0.0, rows.t_s[-1])
     ax.set_xlabel(axis_label(rows, "t_s"))
     ax.set_ylabel(axis_label(rows, "clearance_mm"))

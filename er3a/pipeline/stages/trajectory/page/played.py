@@ -65,7 +65,7 @@ def motions(
         seen = [*events(path), *_near_events(path, near, results.clearance), *added(path.name)]
         if path.verdict == "safe" and not near:
             seen += _nearest(path.clearance)
-        seen += _safe_end(path, results.clearance)
+        seen += safe_end(path, results.clearance)
         motions.append(
             PlayedMotion(
                 path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path), whole_s=path.duration_s
@@ -88,19 +88,15 @@ def _nearest(least: model.MinClearance | None) -> list[PlayedEvent]:
     return [PlayedEvent(least.t_s, least.t_s, text, "plain")]
 
 
-def _safe_end(path: model.PathSummary, clearance: model.Clearances) -> list[PlayedEvent]:
+def safe_end(path: model.PathSummary, clearance: model.Clearances) -> list[PlayedEvent]:
     """The moment up to which a path that meets something may be run: how clear it is there, and after a stop."""
     end, last = path.sound_end, path.clear_until
     if end is None or last is None or end.t_s < last.t_s:
         return []
     rows = clearance.take((clearance.path == path.name) & (clearance.strategy == ""))
-    text = clear_at_end(float(np.interp(end.t_s, rows.t_s, rows.clearance_mm)), last)
+    here = fixed(float(np.interp(end.t_s, rows.t_s, rows.clearance_mm)), 1)
+    text = tr("{here} mm clear here, {after} mm after the stop", here=here, after=fixed(last.margin_mm, 1))
     return [PlayedEvent(end.t_s, end.t_s, text, "plain")]
-
-
-def clear_at_end(far_mm: float, end: model.ClearUntil) -> str:
-    """How clear a path that meets something is where it may end."""
-    return tr("{here} mm clear here, {after} mm after the stop", here=fixed(far_mm, 1), after=fixed(end.margin_mm, 1))
 
 
 def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:

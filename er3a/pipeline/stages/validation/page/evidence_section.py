@@ -14,7 +14,7 @@ from er3a.identifiability.entry_evidence import EntryEvidence, Status
 from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.confirm import on_pendant
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
+from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS, entry_word
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.pipeline.viewing.answer import ListRow
@@ -89,8 +89,10 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
             if status in present
         ],
         open_columns=OPEN_COLUMNS,
-        open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
-        settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
+        open_rows=[
+            [*_row(each, evidence), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left
+        ],
+        settled_rows=[_row(each, evidence) for each in numbers if each.status in SETTLED],
         looks=[each for each in evidence.proposals if each.params.get("seen") in TOWARD],
         first=first if evidence.contradicted else to_confirm(evidence),
     )
@@ -116,11 +118,6 @@ def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
             off = _tool_off(worst) if worst and worst.off.moves else tr("may hit a stop") if worst else ""
             rows.append(ListRow("caution", tr(text, names=named), off, f"#{place}"))
     return rows
-
-
-def entry_word(entry: str) -> str:
-    """An entry's name as the table's columns have it, such as ``α6``."""
-    return entry.replace("alpha", "α").replace("beta", "β")
 
 
 def known_alone(evidence: TableEvidence) -> int:
@@ -177,6 +174,11 @@ def _gives(each: EntryEvidence, evidence: TableEvidence) -> str:
     return _plain(value) if given and abs(value - (each.value or 0.0)) > DIFFERS else ""
 
 
+def _other_given(each: EntryEvidence, evidence: TableEvidence) -> str:
+    """What an entry may be instead, or as well; empty where that is no other number."""
+    return _gives(each, evidence) or _alone(each)
+
+
 def _alone(each: EntryEvidence) -> str:
     """Another value that an open entry may have though all others are right; empty where it has none."""
     readings = [reading for reading in each.alternatives if reading.off.moves and not reading.excluded_by]
@@ -216,7 +218,7 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any]
         status=each.status,
         mark=MARKS[each.status],
         title=tr("{entry}: {status}", entry=each.entry, status=_status(each.status)),
-        gives=_gives(each, evidence) or _alone(each),
+        gives=_other_given(each, evidence),
     )
 
 
@@ -233,12 +235,12 @@ def _plain(value: float, digits: int = 3) -> str:
     return fixed(value, digits).rstrip("0").rstrip(".")
 
 
-def _row(each: EntryEvidence) -> list[str]:
+def _row(each: EntryEvidence, evidence: TableEvidence) -> list[str]:
     return [
-        each.entry,
+        entry_word(each.entry),
         with_unit(_plain(each.value or 0.0), each.unit),
         _marked(each.status),
-        _interval(each),
+        _interval(each, evidence),
         joined(each.by, ", ") or "–",
     ]
 
@@ -257,14 +259,15 @@ def _tool_off(each: EntryEvidence) -> str:
     return tr("at least {off}", off=off) if each.at_least else off
 
 
-def _interval(each: EntryEvidence) -> str:
+def _interval(each: EntryEvidence, evidence: TableEvidence) -> str:
     if each.interval is None or each.status == "gauge":
         return "–"
     low, high = (_plain(value, 2) for value in each.interval)
     if column_of(each.entry) == "direction":
         return tr("{low} or {high}", low=low, high=high) if low != high else low
     if each.status in ("consistent", "open"):
-        return tr("anything")
+        other = _other_given(each, evidence)
+        return with_unit(joined([_plain(each.value or 0.0), other], tr(" or ")), each.unit) if other else tr("anything")
     text = tr("{low} to {high}", low=low, high=with_unit(high, each.unit))
     return tr("at least {off}", off=text) if each.at_least else text
 
@@ -281,5 +284,7 @@ def _off(mm: float, deg: float) -> str:
 def _fits(each: EntryEvidence) -> str:
     """Other values that independent documents allow, and that make another robot."""
     others = [reading for reading in each.alternatives if reading.off.moves and not reading.excluded_by]
-    named = (joined([f"{name} = {_plain(value)}" for name, value in reading.entries], ", ") for reading in others)
+    named = (
+        joined([f"{entry_word(name)} = {_plain(value)}" for name, value in reading.entries], ", ") for reading in others
+    )
     return joined(named) or "–"

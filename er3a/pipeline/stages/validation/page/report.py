@@ -20,6 +20,7 @@ from er3a.pipeline.language import N_, own_title, tr, unit_sign, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured
 from er3a.pipeline.messages.pages import GRADE_NAMES
+from er3a.pipeline.messages.references import entry_word
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES
 from er3a.pipeline.results import Stored
@@ -27,7 +28,6 @@ from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
 from er3a.pipeline.stages.validation.page.evidence_section import (
     SETTLED,
-    entry_word,
     evidence_section,
     known_alone,
     other_robot,
@@ -212,7 +212,7 @@ def _look(robot: Robot, found: Finding) -> Markup:
     side = max(VIEWS, key=lambda each: np.linalg.norm(np.diff(ways[:, -1, -1] @ VIEWS[each], axis=0)))
     right, wrong = ways @ VIEWS[side]
     arms = [
-        SeenArm(tr("direction{joint} is right", joint=found.joint), "", "right", right[-1]),
+        SeenArm(tr("{entry} is right", entry=entry_word(found.entry)), "", "right", right[-1]),
         SeenArm(tr("turn its sign"), "", "wrong", wrong[-1]),
     ]
     size = 2 * RADIUS * float(np.ptp(right[-1], axis=0).max())
@@ -263,7 +263,9 @@ def _answer(
     elif evidence and unsure:
         settled = sum(each.status == "settled" for each in evidence.entries)
         signs = known_alone(evidence) - unsure - settled
-        below = tr("{settled} settled, {signs} but for signs, {left} open.", settled=settled, signs=signs, left=unsure)
+        below = tr(
+            "{settled} settled, {signs} but for signs, {left} to confirm.", settled=settled, signs=signs, left=unsure
+        )
     values = [stated.expected for each in disputed[:1] for stated in each.statements]
     if disputed:
         off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)

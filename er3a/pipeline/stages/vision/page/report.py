@@ -185,7 +185,7 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
         )
         keys = [
             (f"{fixed(100 * least, 1)} %", tr("least success: {name}", name=name)),
-            (with_unit(f"{fixed(error.together, 1)} / {limit:g}", "mm"), made),
+            (tr("{value} of {limit}", value=fixed(error.together, 1), limit=with_unit(f"{limit:g}", "mm")), made),
         ]
     elif found:
         half = fixed(max(found.hand_eye.half_width_mm), 2)
@@ -196,7 +196,9 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     shown = [_row(each, grasp_moment(results, each), fix) for each in objects]
     refused = [row for row in shown if row.mark == "fail"]
     groups = [
-        Group(all_caught(caught) if caught == len(refused) else tr("Can't be grasped"), refused),
+        Group(
+            all_caught(caught) if caught == len(refused) else tr("Can't be grasped"), refused, caught != len(refused)
+        ),
         Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
     if found:

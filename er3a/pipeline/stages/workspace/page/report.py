@@ -10,7 +10,7 @@ from markupsafe import Markup
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.messages.say import FORMATS, joined, say
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
 from er3a.pipeline.results import Stored
@@ -106,6 +106,8 @@ def _key_of(void: model.VoidSummary, name: str) -> tuple[str, str]:
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: which one, how large."""
     note = workspace_figures.if_normal(void, with_unit(workspace_figures.litres(void), "L"))
+    if not void.holds_shoulder:
+        note = joined([note, *map(FORMATS["limit"], void.cause.params.get("limits", ()))], ", ")
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
 
 
