@@ -263,11 +263,13 @@ def _answer(
     elif evidence and unsure:
         settled = sum(each.status == "settled" for each in evidence.entries)
         signs = known_alone(evidence) - unsure - settled
-        below = tr("{settled} settled, {signs} but for signs, {left} open.", settled=settled, signs=signs, left=unsure)
+        below = tr(
+            "{settled} settled, {signs} but for signs, {left} to confirm.", settled=settled, signs=signs, left=unsure
+        )
     values = [stated.expected for each in disputed[:1] for stated in each.statements]
     if disputed:
         off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)
-        keys[0] = tr("{far} of difference", far=off), tr("between documents")
+        keys.insert(0, (tr("{far} of difference", far=off), tr("between documents")))
     fix = None
     if instead:
         fix = Fix(
