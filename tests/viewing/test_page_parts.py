@@ -61,7 +61,7 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
         if status != "contradicted":
             assert "→" not in shown
             continue
-        value, given = re.search(r"<s>(.*?)</s> <b>→(.*?)</b>", shown.replace("−", "-")).groups()
+        value, given = re.search(r"<s>(.*?)</s> <b><i>→</i>(.*?)</b>", shown.replace("−", "-")).groups()
         assert float(value) == round(entry.value, 3), entry
         assert entry.interval[0] <= float(given) <= entry.interval[1], entry
     assert any("direction" in each.entry and each.status == "contradicted" for each in stated)

@@ -28,7 +28,7 @@ from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.drawn import floor_of
 from er3a.pipeline.viewing.page import PAGES, Head, head_of
-from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, beyond, border_lines, seen_arm, side_view
+from er3a.pipeline.viewing.side_view import Kind, SeenArm, beyond, border_lines, seen_arm, side_view, through_floor
 
 USES = ("use", "plan", "measure", "never")  # from what may be relied on most
 MAX_CHANGED = 6  # files that have changed since, and are named
@@ -179,12 +179,10 @@ def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Resul
     floor = floor_of(study.scene(name, "trajectory"))
     floor_mm = floor and 1000 * floor
     seen = [_seen(study, entry.name, entry.use, stored[entry.name]) for entry in drawn]
-    reach = _reach(stored[name])
-    labels = void_labels(reach) if reach else []
-    for arm in seen:
-        lowest = arm.points_mm[arm.points_mm[:, 1].argmin()]
-        if floor_mm is not None and lowest[1] < floor_mm:
-            labels.append(Label(tr("through the floor"), lowest, "wrong"))
+    labels = through_floor(seen, floor_mm)
+    for arm, entry in zip(seen, drawn):
+        if reach := _reach(stored[entry.name]):
+            labels += void_labels(reach, arm.kind)
     return side_view(seen, floor_mm, ratio=2.06, labels=labels, column_mm=beyond(seen))
 
 

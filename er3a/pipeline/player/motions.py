@@ -170,7 +170,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0) -
     events = motion.events if motion else ()
     gravest = min(((each.t, each.until) for each in events if each.status == fault.status), default=None)
     fix = fix_of([fault])
-    if fix and not fix.address and gravest and gravest[0] < gravest[1]:  # what is wrong is played
+    if fix and not fix.address and fails and gravest and gravest[0] < gravest[1]:  # what is wrong is played
         fix = replace(fix, address=fault.address.replace("#", f"&until={gravest[1]:.9g}#"))
     return ListRow(
         "fail" if fails else "caution",

@@ -27,11 +27,8 @@ const unjudged = document.querySelector(".answer .no_verdict") && { events: [], 
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const floor = data.floor ?? column(table.base, 3)[2];
 
-let motion = motions.values().next().value;
-let t = 0;
-let playing = false;
-let last = 0;
-let awaited = false;
+let [motion, t, playing, last, awaited] = [motions.values().next().value, 0, false, 0, false];
+let apart = ""; // how far the tool of a wrong table is from that of the other, now
 
 const space = new Space(canvas, data.target, data.length, refresh);
 const arms = [data, ...data.others].map((arm, k) => ({
@@ -120,6 +117,7 @@ function draw() {
   space.floor(column(table.base, 3), data.size / 10, floor);
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
   arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value, k === 0 && Boolean(wrong)));
+  space.keepClear(poses.flatMap(alongArm), ARM * data.size);
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
   const numbered = others.map((own, k) => sticks(own, data.solutions[k], poses[0]));
   const keys = numbered.map((at) => at.map((value) => value.toFixed(2)).join());
@@ -142,7 +140,9 @@ function draw() {
   const worst = GRAVEST.find((status) => now.some((event) => event.status === status)); // what comes with it is not named
   for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j]);
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
-  space.keepClear(poses.flatMap(alongArm), ARM * data.size);
+  const [from, to] = poses.map((own) => column(own.at(-1), 3));
+  if (wrong) apart = `${fixed(1000 * Math.hypot(...subtract(from, to)), 0)} mm`;
+  if (wrong) marks.push({ from, to, text: apart });
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
   space.keepClear([...axes.flatMap(([a, b]) => [b, scaled(add(a, b), 0.5)]), motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) {
@@ -211,7 +211,7 @@ function tell() {
   clock.textContent = said.replace("{t}", at).replace("{end}", last);
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
-  const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : motion.text;
+  const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : apart ? words.apart.replace("{off}", apart) : motion.text;
   show(nowShown, (now[0]?.status === "plain" ? now.at(-1) : now[0])?.text || ends); // the first fault is the cause
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();

@@ -211,23 +211,23 @@ KINDS = {HULL: "hull", CYLINDER: "cylinder", HALF_SPACE: "half_space"}
 def write_teach_page(study: Study, name: str, results: Path, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     validated = results / name / "validation"
-    known = is_computed(validated)
+    known, instead = is_computed(validated), alternative_table(study, name, validated)
+    scene = instead or name  # a wrong table is shown where the right one is, as on all pages
+    inputs = dict.fromkeys([*study.inputs(name, "teach"), *study.scenes(scene, "trajectory")])
     write_panel(
         study.robot(name),
         output,
         near=near_singular(study.section(TrajectorySettings)),
-        scene=study.scene(name, "trajectory"),
+        scene=study.scene(scene, "trajectory"),
         home=_home(study, name),
         robots=robots_with(study, "teach"),
         robot_pages=study.pages(name),
         first_caveat=caveat(read_foundation(validated) if known else "not_computed"),
-        instead=alternative_table(study, name, validated),
+        instead=instead,
         head=program_head(validated if known else None),
         condition=condition_of(validated) if known else ("", 0),
         command=run_command(study, f"{name}/teach.html"),
-        provenance=Provenance(
-            input_records(study.inputs(name, "teach")), code_digest(), config=study.settings(name, "trajectory")
-        ),
+        provenance=Provenance(input_records(inputs), code_digest(), config=study.settings(name, "trajectory")),
     )
 
 
@@ -260,7 +260,8 @@ def write_panel(
     ----------
     near : where the panel warns of a singularity
     home : (n,), rad or m, that the panel opens at; else that of the robot's file, or else joints in the middle of
-        their limits, but for one, the farthest from singular first: the first of these that is clear and regular
+        their limits, but for one, the farthest from singular first, or for one or two: the first of these that is
+        clear and regular
     robots, robot_pages : of the study: arms with a panel (name, title, address), and this arm's other pages
     first_caveat : what to know of its table, if anything; condition : what of it has to be confirmed, and
         how many entries these are
@@ -268,9 +269,13 @@ def write_panel(
     head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
-    tried = (robot.lower + robot.upper) / 2 + np.diag(robot.upper - robot.lower) / 4
+    middle, steps = (robot.lower + robot.upper) / 2, np.diag(robot.upper - robot.lower) / 4
+    tried = middle + steps
     regular = tried[conditioning(robot, tried).smallest_singular_value.argsort()[::-1]]
-    rows = np.clip([*(q for q in (home, robot.home) if q is not None), *regular], robot.lower, robot.upper)
+    known = [q for q in (home, robot.home) if q is not None]
+    rows = np.clip(
+        [*known, *regular, *(middle - steps[:, None] - steps).reshape(-1, robot.joints)], robot.lower, robot.upper
+    )
     opened = rows[(Bodies(robot, scene).free(rows, NEAR_TOUCH) & ~near.contains(robot, rows)).argmax()]
     panel = own | {
         "programs": own["programs"] and not (first_caveat and first_caveat.status == "fail"),
@@ -279,6 +284,8 @@ def write_panel(
         "floor": floor_of(scene),
         "clearance": clearance_data(robot, scene),
         "home": opened.tolist(),
+        "target": ((robot.base + frames(robot, opened)[-1]) / 2)[:3, 3].tolist(),  # where the picture's eye looks, m
+        "length": 0.68 * drawn_size(robot),
         "head": [*map(ascii_text, program_head(None) if head is None else head)],
     }
     render(
@@ -328,15 +335,8 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
         "joint_names": joint_names(robot),
         "colours": {"joints": JOINTS, "touching": TOUCHING},
         "axes": AXES,
-        **dict(zip(("target", "length"), _looked_at(robot))),
         "words": _translated(WORDS),
     }
-
-
-def _looked_at(robot: Robot) -> tuple[list[float], float]:
-    """Where the picture's eye looks, (3,), m, and about how long the arm is from there, m."""
-    tool = frames(robot, (robot.lower + robot.upper) / 2)[-1, :3, 3]
-    return ((robot.base[:3, 3] + tool) / 2).tolist(), 0.68 * drawn_size(robot)
 
 
 def singular_sets(robot: Robot) -> dict[str, Any] | None:

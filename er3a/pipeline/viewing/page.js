@@ -381,7 +381,6 @@ function keepWarnings(main) {
 // One field over the whole page; the address keeps its words, as "?find=words". The index looks on all pages with it.
 function addFinder() {
   const main = document.querySelector("main");
-  if (document.body.classList.contains("teach")) return;
   const box = Object.assign(document.createElement("p"), { className: "find", role: "search" });
   const field = document.createElement("input");
   const status = Object.assign(document.createElement("span"), { role: "status" });

@@ -122,6 +122,13 @@ def flanges_off(arms: Sequence[SeenArm]) -> list[Label]:
     return [Label(off, right, "wrong", start=wrong)] if far > SEEN_MM else []
 
 
+def through_floor(arms: Sequence[SeenArm], floor_mm: float | None) -> list[Label]:
+    """A word at the lowest point of each arm that is lower than the floor; None: there is no floor."""
+    lowest = [arm.points_mm[arm.points_mm[:, 1].argmin()] for arm in arms]
+    aside, said = [BONE * float(np.ptp(_corners(arms)[:, 1])), 0.0], tr("through the floor")
+    return [Label(said, at + aside, "wrong") for at in lowest if floor_mm is not None and at[1] < floor_mm]
+
+
 def dimension(far: float, low: float, high: float, kind: LabelKind) -> list[DrawnLine]:
     """A dimension at the height ``low``, from axis 1 to ``far`` in front of it, with a tick at both ends, and a dashed
     line from its end up to ``high``; all in mm. As ``over`` of :func:`side_view` takes it."""
@@ -187,9 +194,9 @@ def side_view(
         below = np.array([low[0], floor_mm - GAP * tall])
         labels = [*labels, Label(tr("floor"), below, "floor", written_there=True)]
     placed = _placed(labels, low, high, column_mm)
-    parts += [_lead(label, place) for label, place in placed]
     thick = min(BONE * tall, THICKEST * float(np.ptp(arms[0].points_mm, axis=0).max()))
     parts += [_arm(arm, thick * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
+    parts += [_lead(label, place) for label, place in placed]
     parts += _over(arms, over, LETTERS * tall)
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(

@@ -11,7 +11,7 @@ import numpy as np
 from er3a.collision.pairs import names_of
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
@@ -199,7 +199,8 @@ def _to_do(
         return text, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe":
         near = near_assumed(path, summary)
-        measure = tr("Measure {pair}.", pair=say(near.pair)) if near else ""
+        text = N_("Measure {pair}: shapes may be off by at most {far} mm.")
+        measure = tr(text, pair=say(near.pair), far=fixed(near.clearance_mm, 1)) if near else ""
         return joined([*remedies(path.of_program), measure], " "), None
     last = path.sound_end
     if last is None:

@@ -23,7 +23,7 @@ from er3a.pipeline.messages.trajectory import (
     strategy_text,
     strategy_word,
 )
-from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, opened, row_of
+from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, opened, row_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -254,11 +254,9 @@ def both_arms(
         ends = [forward(arm, motion.q) for arm in arms]
         off = shift_between(*ends)
         k = np.argmax(off)
-        far, t = with_unit(fixed(1000 * off[k], 0), "mm"), motion.t[k]
-        start, end = (T[k, :3, 3].tolist() for T in ends)
-        said = whole_sentence(tr("flange {off} off", off=far))
-        seen.append(replace(motion, text=said, beside=(motion.q,), marks=[Mark(t, t, start, end, far)], ghosts=()))
-        rows.append((off[k], far, (motion.name, t)))
+        far = with_unit(fixed(1000 * off[k], 0), "mm")
+        seen.append(replace(motion, beside=(motion.q,), ghosts=()))
+        rows.append((off[k], far, (motion.name, motion.t[k])))
     rows.sort(reverse=True)
     whole, most, opened = rows[0]
     listed = [ListRow("fail", at[0], far, "", at, off / whole) for off, far, at in rows]

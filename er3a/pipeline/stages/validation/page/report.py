@@ -269,7 +269,7 @@ def _answer(
     values = [stated.expected for each in disputed[:1] for stated in each.statements]
     if disputed:
         off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)
-        keys[0] = tr("{far} of difference", far=off), tr("between documents")
+        keys.insert(0, (tr("{far} of difference", far=off), tr("between documents")))
     fix = None
     if instead:
         fix = Fix(

@@ -18,6 +18,7 @@ from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
 from er3a.pipeline.stages.workspace.page.tray import Placing, found_by, placing_of
+from er3a.pipeline.stages.workspace.page.workspace_figures import about, if_normal
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow
 from er3a.pipeline.viewing.page import alternative_table, render_stage, whole_sentence
@@ -83,7 +84,7 @@ def _answer(
         rest = whole_sentence(tr("{tray} fits", tray=tray.name))
         fix = Fix(tr("add the tray and its stand to the scene at {centre} mm.", centre=centre), "#tray-1", False)
     keys = [
-        *(_key_of(void, row.name) for (_, void), row in zip(in_order[:1], voids)),
+        *((about(void), if_normal(void, row.name)) for (_, void), row in zip(in_order[:1], voids)),
         (
             with_unit(fixed(volume.middle, 2), "m³"),
             tr("± {half} m³, proven", half=fixed(volume.upper - volume.middle, 2)),
@@ -95,17 +96,9 @@ def _answer(
     return Answer(whole_sentence(reaches(summary)), rest, below, keys, groups, fix)
 
 
-def _key_of(void: model.VoidSummary, name: str) -> tuple[str, str]:
-    """About how large a void is, in the fewest digits that keep within its bounds, and what it is called."""
-    low, high = (1000 * bound for bound in (void.volume_m3.lower, void.volume_m3.upper))
-    sizes = [float(f"{(low + high) / 2:.{digits}g}") for digits in range(1, 9)]
-    about = next((size for size in sizes if low <= size <= high), high)
-    return tr("about {size:g} L", size=about), workspace_figures.if_normal(void, name)
-
-
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: which one, how large."""
-    note = workspace_figures.if_normal(void, with_unit(workspace_figures.litres(void), "L"))
+    note = if_normal(void, with_unit(workspace_figures.litres(void), "L"))
     if not void.holds_shoulder:
         note = joined([note, *map(FORMATS["limit"], void.cause.params.get("limits", ()))], ", ")
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")

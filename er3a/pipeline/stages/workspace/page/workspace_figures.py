@@ -20,7 +20,16 @@ from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import drawn_scene, floor_of, frame_between, poses_at
 from er3a.pipeline.viewing.palette import VERDICTS, VOIDS
-from er3a.pipeline.viewing.side_view import DrawnLine, Kind, Label, SeenArm, border_lines, dimension, side_view
+from er3a.pipeline.viewing.side_view import (
+    DrawnLine,
+    Kind,
+    Label,
+    SeenArm,
+    border_lines,
+    dimension,
+    side_view,
+    through_floor,
+)
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
@@ -28,6 +37,7 @@ from er3a.workspace.voids import mesh as surface_of
 
 REACHED = "#9ecae1"
 ASIDE = (0.12, 0.28)  # of the reach, from a void before axis 1 to its name
+INSIDE = 0.6  # of a void's extent, from axis 1 to its name in it
 WIDE = 1.7  # width of the figure of two arms, of its height
 AHEAD = np.array([1.0, 0.0, 0.0])  # of the arm at zero
 BELOW = 0.08  # of the reach, from what is reached down to its dimension
@@ -150,7 +160,7 @@ def labelled(
     ----------
     arms : what is proven of each
     floor_mm : height of the floor in the base's frame; None where there is none
-    contradicted : whether the table of the last arm is: that arm is red, and no void has a name
+    contradicted : whether the table of the last arm is: that arm is red, and what it reaches has the names
 
     Returns
     -------
@@ -165,12 +175,13 @@ def labelled(
         lines = border_lines(border.arc, border.rho_m, border.z_m)
         seen.append(SeenArm(own_title(robot.title), "", kind, arm, lines))
         outer = np.concatenate(lines)
-        if not contradicted:
-            labels += void_labels(summary)
+        if kind == "wrong" or not contradicted:
+            labels += void_labels(summary, kind)
         far, height = outer[outer[:, 0].argmax()]
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([far / 2, below - BELOW * far]), kind, "reach"))
         over += [*dimension(far, below, height, kind), DrawnLine(outer, "mark")]  # which no row shows: it is within
+    labels += through_floor(seen, floor_mm)
     return side_view(seen, floor_mm, ratio=WIDE if arms[1:] else 1.2, labels=labels, over=over)
 
 
@@ -178,6 +189,13 @@ def litres(void: model.VoidSummary) -> str:
     """Bounds of a void's volume in litres, rounded outwards."""
     low, high = (1000 * bound for bound in (void.volume_m3.lower, void.volume_m3.upper))
     return tr("{low} to {high}", low=at_least(low, "L"), high=at_most(high, "L"))
+
+
+def about(void: model.VoidSummary) -> str:
+    """About how large a void is, in the fewest digits that keep within its bounds."""
+    low, high = (1000 * bound for bound in (void.volume_m3.lower, void.volume_m3.upper))
+    sizes = [float(f"{(low + high) / 2:.{digits}g}") for digits in range(1, 9)]
+    return tr("about {size:g} L", size=next((size for size in sizes if low <= size <= high), high))
 
 
 def void_name(number_: int, void: model.VoidSummary) -> str:
@@ -194,15 +212,21 @@ def if_normal(void: model.VoidSummary, said: str) -> str:
     return tr("{what}: normal", what=said) if void.holds_shoulder else said
 
 
-def void_labels(summary: model.WorkspaceSummary) -> list[Label]:
-    """A word for each void all around axis 1, led to it from its side; a list says how large it is."""
+def void_labels(summary: model.WorkspaceSummary, kind: Kind = "right") -> list[Label]:
+    """A word for each void all around axis 1, led to it from its side; a list says how large it is. In those of a
+    ``wrong`` arm, but at its shoulder, how large they are."""
     labels = []
     for number_, void in enumerate(summary.voids, 1):
         low, high = void.low_m[0], void.high_m[0]
         across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
         start = 1000 * np.array([across, void.centroid_m[2]])
         at = start + 1000 * summary.reach_m.furthest_from_axis * np.array(ASIDE)
-        if void.kind == "enclosed":
+        if void.kind != "enclosed":
+            continue
+        if kind == "right":
             said = if_normal(void, void_name(number_, void))
             labels.append(Label(said, at, "hole", f"hole-{number_}", start, written_there=True))
+        elif not void.holds_shoulder:
+            within = 1000 * np.array([INSIDE * low, (void.centroid_m[2] + void.high_m[2]) / 2])
+            labels.append(Label(tr("void {size}", size=about(void)), within, kind, written_there=True))
     return labels
