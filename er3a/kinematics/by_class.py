@@ -86,20 +86,6 @@ class ArmSolver:
 
 
 @dataclass(frozen=True, eq=False)
-class ClassRows:
-    """Solutions of a block of poses.
-
-    Attributes
-    ----------
-    q : (N, slots, n), manufacturer's values, angles in (-pi, pi]; NaN in empty slots
-    certainty : (N,), CERTAIN, UNCERTAIN or CONTINUUM
-    """
-
-    q: Reals
-    certainty: Integers
-
-
-@dataclass(frozen=True, eq=False)
 class Settled:
     """Solutions of one pose: isolated ones, and self-motions, nearest to the reference first."""
 
@@ -204,7 +190,7 @@ def checked_parameters(robot: Robot, redundancy: Reals | None, q_ref: Reals, cou
     return values
 
 
-def class_rows(robot: Robot, T: Reals, values: Reals) -> ClassRows:
+def class_rows(robot: Robot, T: Reals, values: Reals) -> Reals:
     """All rows that the class finds for poses.
 
     Parameters
@@ -214,10 +200,9 @@ def class_rows(robot: Robot, T: Reals, values: Reals) -> ClassRows:
 
     Returns
     -------
-    rows : (N, slots, n) and how sure the solver is (N,)
+    q : (N, slots, n), manufacturer's values, angles in (-pi, pi]; NaN in empty slots
     """
-    x, certainty = arm_solver(robot).chain.rows(T, values)
-    return ClassRows(to_joints(robot, x), certainty)
+    return to_joints(robot, arm_solver(robot).chain.rows(T, values)[0])
 
 
 def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, certainty: int) -> Settled:
@@ -295,7 +280,7 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
     if isinstance(solver.chain, ArmAngle) and is_out_of_reach(solver.chain.arm, T):
         return Settled(np.empty((0, robot.joints)))
     grid = np.concatenate([values, _scanned(robot, SCANNED)])
-    q = class_rows(robot, np.broadcast_to(T, (len(grid), 4, 4)), grid).q.reshape(-1, robot.joints)
+    q = class_rows(robot, np.broadcast_to(T, (len(grid), 4, 4)), grid).reshape(-1, robot.joints)
     more = to_joints(robot, solver.poses_at(T).roots(_starts(robot, STARTS)))  # curves between the values scanned
     return settle(robot, T, np.concatenate([q[np.isfinite(q[:, 0])], more]), q_ref, values, CERTAIN)
 
@@ -330,7 +315,7 @@ def nearest_value(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Reals:
     for _ in range(1 + CLOSER):
         away = np.abs(np.remainder(tried - values + np.pi, 2 * np.pi) - np.pi if turns else tried - values)
         tried = tried[away[:, 0].argsort(kind="stable")[:most]]
-        q = nearest_equivalent(robot, class_rows(robot, np.broadcast_to(T, (len(tried), 4, 4)), tried).q, q_ref)
+        q = nearest_equivalent(robot, class_rows(robot, np.broadcast_to(T, (len(tried), 4, 4)), tried), q_ref)
         fits = np.flatnonzero(within(robot, q).any(axis=1))
         if not fits.size:
             return values
@@ -609,7 +594,7 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
     slot : 0 if they are none of the class's rows
     """
     values = checked_parameters(robot, None, q[None], 1)
-    rows = class_rows(robot, T[None], values).q[0]
+    rows = class_rows(robot, T[None], values)[0]
     far = _moves_between(robot, rows, q)
     return int(far.argmin()) if far.min() < SAME_ROW else 0
 

@@ -294,7 +294,7 @@ def is_complete(robot: Robot, certainty: Integers) -> Flags:
 
     Parameters
     ----------
-    certainty : (N,), of the class, see :class:`.by_class.ClassRows`
+    certainty : (N,), of the class, CERTAIN, UNCERTAIN or CONTINUUM
 
     Returns
     -------

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Sequence
-from itertools import compress
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -12,7 +11,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-LISTED_AT_ONCE = 1 << 13  # rows whose texts are Python objects at a time
 ROWS_AT_ONCE = 1 << 15  # all texts of a million rows would take a hundred MB
 
 
@@ -51,18 +49,11 @@ class ParquetColumns:
     Parameters
     ----------
     content : of the file
-    only : a column of texts and those of them whose rows are read; None for all rows
     """
 
-    def __init__(self, content: bytes, only: tuple[str, Container[str]] | None = None) -> None:
+    def __init__(self, content: bytes) -> None:
         self._file = pq.ParquetFile(pa.BufferReader(content))
         self.names: list[str] = self._file.schema_arrow.names
-        self._rows = None if only is None else np.array([each in only[1] for each in self._listed(only[0])], bool)
-
-    def _listed(self, name: str) -> Iterator[Any]:
-        """The values of a column one by one: few of them are in memory at a time."""
-        batches = self._file.iter_batches(batch_size=LISTED_AT_ONCE, columns=[name])
-        return (value for batch in batches for value in batch[0].to_pylist())
 
     def values(self, name: str, spec: Kept) -> Any:
         """A column's values; its own ``to_numpy`` would load pandas.
@@ -77,13 +68,12 @@ class ParquetColumns:
         values : an array, or a tuple with what each row has
         """
         if spec.dtype != object and spec.dtype != bool and not spec.lists:
-            whole = np.from_dlpack(self._file.read([name])[0].combine_chunks())
-            return np.array(whole if self._rows is None else whole[self._rows])
-        listed = self._listed(name) if self._rows is None else compress(self._listed(name), self._rows)
+            return np.array(np.from_dlpack(self._file.read([name])[0].combine_chunks()))
+        parts = (batch[0].to_pylist() for batch in self._file.iter_batches(columns=[name]))
         if spec.lists:
-            return tuple(map(np.array, listed))
+            return tuple(np.array(row) for part in parts for row in part)
         kept: dict[Any, Any] = {}  # one object for equal texts: a few of them fill a million rows
-        return tuple(kept.setdefault(each, each) for each in listed)
+        return tuple(kept.setdefault(each, each) for part in parts for each in part)
 
 
 def _arrow_type(spec: Kept) -> pa.DataType:

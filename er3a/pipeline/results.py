@@ -256,7 +256,7 @@ def write_results(
 
 
 def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
-    """Read a stage's results as its pages show them, or :class:`AbsentResults` if it was not computed.
+    """Read a stage's results, or :class:`AbsentResults` if it was not computed.
 
     Raises
     ------
@@ -269,8 +269,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
         absent = AbsentResults(summary)
         origin = adapter(Provenance).validate_python(record["provenance"])
         return Stored(record["robot"], stage.name, origin, absent, table, folder)
-    found = read_results(folder, stage.module("model").RESULTS, record, on_pages=True)
-    return replace(found, table=table, folder=folder)
+    return replace(read_results(folder, stage.module("model").RESULTS, record), table=table, folder=folder)
 
 
 def table_below(folder: Path, stage: Stage) -> Foundation | None:
@@ -298,15 +297,12 @@ def is_computed(folder: Path) -> bool:
     return (folder / SUMMARY).is_file()
 
 
-def read_results(
-    folder: Path, kind: type[ResultsT], record: dict[str, Any] | None = None, *, on_pages: bool = False
-) -> Stored[ResultsT]:
+def read_results(folder: Path, kind: type[ResultsT], record: dict[str, Any] | None = None) -> Stored[ResultsT]:
     """Read the results of a stage that was computed.
 
     Parameters
     ----------
     record : the summary as plain data, if it is read already; it is emptied, as with thousands of targets it is large
-    on_pages : whether only those rows are read that pages show
 
     Raises
     ------
@@ -323,7 +319,7 @@ def read_results(
         content = read_bytes(file)
         _compare(file, content, sums)
         try:
-            tables[name] = table.read(content, table.on_pages(summary) if on_pages else None)
+            tables[name] = table.read(content)
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ResultError(file, f"damaged ({' '.join(str(error).split())})") from None
     return Stored(*of, provenance, kind(summary=summary, **tables))

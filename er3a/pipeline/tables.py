@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
@@ -339,27 +339,12 @@ class Table(ByValue):
         write_columns(file, [(name, values, spec, self._described(name, spec)) for name, values, spec in self._flat()])
 
     @classmethod
-    def on_pages(cls, summary: Any) -> tuple[str, Container[str]] | None:
-        """Which rows of a table the pages of a stage need.
-
-        Parameters
-        ----------
-        summary : of the stage
-
-        Returns
-        -------
-        rows : a column of texts and which of them; None for all rows
-        """
-        return None
-
-    @classmethod
-    def read(cls, content: bytes, only: tuple[str, Container[str]] | None = None) -> Self:
+    def read(cls, content: bytes) -> Self:
         """Read what :meth:`write` wrote.
 
         Parameters
         ----------
         content : of a Parquet file; columns that the table does not declare are passed over
-        only : which rows, as of :meth:`on_pages`
 
         Raises
         ------
@@ -368,7 +353,7 @@ class Table(ByValue):
         """
         from er3a.pipeline.parquet import ParquetColumns
 
-        stored = ParquetColumns(content, only)
+        stored = ParquetColumns(content)
         arrays: dict[str, Any] = {}
         slides: tuple[bool, ...] = ()
         for name, spec in cls.columns().items():

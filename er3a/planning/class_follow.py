@@ -130,7 +130,7 @@ class _LawSearch:
         q : (K, A, s, n), rad or m; NaN where there is none
         """
         count = len(angles)
-        q = class_rows(self.robot, np.repeat(self.T, count, axis=0), np.tile(angles, len(self.T))[:, None]).q
+        q = class_rows(self.robot, np.repeat(self.T, count, axis=0), np.tile(angles, len(self.T))[:, None])
         return q.reshape(len(self.T), count, *q.shape[1:])[:, :, self.slots]
 
     def on_grid(self, laws: Reals) -> Reals:
@@ -160,7 +160,7 @@ class _LawSearch:
         -------
         margin : rad or m; negative where a joint jumps, -inf where a pose is not reached
         """
-        q = class_rows(self.robot, self.T, angles[:, None]).q
+        q = class_rows(self.robot, self.T, angles[:, None])
         return float(self._margins(q[:, None, self.slots[s : s + 1]], np.zeros((len(q), 1), np.int64))[0, 0])
 
     def _margins(self, q: Reals, place: Integers) -> Reals:
@@ -346,7 +346,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
     begin, slots = None, np.arange(arm_solver(robot).chain.slots)
     if q_start is not None:
         begin = float(checked_parameters(robot, None, q_start[None], 1)[0, 0]), q_start
-        own = class_rows(robot, poses[:1], np.array([[begin[0]]])).q[0]
+        own = class_rows(robot, poses[:1], np.array([[begin[0]]]))[0]
         slots = np.flatnonzero((np.abs(_turned_to(robot, own, q_start) - q_start) <= ON_PATH).all(axis=1))
     if not slots.size:
         raise PathEndsError(robot.name, "out_of_reach", 0.0)
@@ -423,7 +423,7 @@ def _turned_inwards(robot: Robot, motion: PiecewiseMotion) -> PiecewiseMotion:
 
 def _rows(robot: Robot, path: ToolPath, t: Reals, values: Reals) -> Reals:
     """All solutions (N, slots, n) at times (N,) and values (N, k) of the redundancy parameters."""
-    return class_rows(robot, path.poses(path.progress(t)[0]), values).q
+    return class_rows(robot, path.poses(path.progress(t)[0]), values)
 
 
 def _followed(robot: Robot, path: ToolPath, start: Reals, rows_at: Callable[[Reals], Reals]) -> PiecewiseMotion:

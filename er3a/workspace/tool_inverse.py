@@ -16,7 +16,6 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import (
     arm_solver,
     checked_parameters,
-    class_rows,
     parameters_of,
     slots_of_class,
     task_mask,
@@ -83,7 +82,7 @@ def pose_cost(robot: Robot) -> float:
     random = np.random.default_rng(_PROBED)
     q = robot.lower + random.random((_PROBED, robot.joints)) * (robot.upper - robot.lower)
     values = checked_parameters(robot, None, q, _PROBED)
-    doubts = class_rows(robot, forward(robot, q), values).certainty != CERTAIN
+    doubts = arm_solver(robot).chain.rows(forward(robot, q), values)[1] != CERTAIN
     return float(cost + CERTAIN_S + DOUBT_S * doubts.mean())
 
 

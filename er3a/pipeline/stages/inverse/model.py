@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,20 +135,6 @@ class SolutionRows(Table):
     limit_margin_deg: Reals = column("smallest distance of a joint from its limits; negative outside")
     greatest_move_deg: Reals = column("the farthest that a joint turns from the reference")
     distance_deg: Reals = column("root of the summed squares of the joint moves")
-
-    @classmethod
-    def on_pages(cls, summary: InverseSummary) -> tuple[str, Container[str]] | None:
-        """Rows of the targets that the summary holds: of many those of the page.
-
-        Parameters
-        ----------
-        summary : of the stage
-
-        Returns
-        -------
-        rows : the column, and the names in it
-        """
-        return "target", {target.name for target in summary.targets}
 
 
 class TargetRows(Table):
