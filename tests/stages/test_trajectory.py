@@ -648,7 +648,7 @@ def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, st
     assert answer_of(found.summary, wrong, ()).fix
     hindered = answer_of(found.summary, wrong, (), met)
     assert hindered.fix is None
-    repairable, judged = hindered.groups[:2]
+    judged, repairable = hindered.groups[:2]
     assert [(row.name, row.note, row.fix) for row in judged.rows if row.name in wrong] == [
         ("line_limits", wrong["line_limits"].verdict, None)
     ]
