@@ -210,7 +210,7 @@ def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, more: Reals
 
     Returns
     -------
-    joined : (M,) bool; nothing is proven of the others
+    joined : (M,) bool; none if only home itself is joined; nothing is proven of the others
     """
     clear = np.flatnonzero(places.clear)
     q = np.concatenate([home[None], places.witness[clear], more])
@@ -225,5 +225,7 @@ def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, more: Reals
         if not joint.connected(a, b) and free_between(bodies.layout, q[a], q[b], DEPTH, LOOKS)[0] == FREE:
             joint.merge(a, b)
     joined = np.zeros(len(places.clear), bool)
-    joined[clear] = [joint.connected(0, node) for node in range(1, len(clear) + 1)]
+    moves = [node for node in joint.subset(0) if (q[node] != home).any()]
+    if moves:
+        joined[clear] = [joint.connected(0, node) for node in range(1, len(clear) + 1)]
     return joined

@@ -14,7 +14,7 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
 from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.singularity import conditioning
+from er3a.kinematics.singularity import USUAL_NEAR, conditioning
 from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
@@ -242,14 +242,15 @@ def _chosen(motions: list[ListedMotion]) -> tuple[Open, ...]:
 
 
 def _home(bodies: Bodies, given: Reals | None, free: Reals) -> tuple[model.HomeFrom, Reals]:
-    """Where places are joined to: the study's home, joints at 0 if that is free of overlap and no limit, where an
-    arm is folded up and few moves lead away, or else one of the free joint vectors (k, n): of the ``HOMES`` nearest to
-    the middle of the limits the one farthest from singular."""
+    """Where places are joined to: the study's home, joints at 0 if that is free of overlap, regular and no limit,
+    where an arm is folded up and few moves lead away, or else one of the free joint vectors (k, n): of the ``HOMES``
+    nearest to the middle of the limits the one farthest from singular."""
     robot = bodies.robot
     zero = np.clip(0.0, robot.lower, robot.upper)
     if given is not None:
         return "study", given
-    if not len(free) or ((robot.lower * robot.upper < 0).all() and bodies.free(zero[None])[0]):
+    regular = (robot.lower * robot.upper < 0).all() and not USUAL_NEAR.contains(robot, zero[None])[0]
+    if not len(free) or (regular and bodies.free(zero[None])[0]):
         return "zero", zero
     away = np.abs(free - (robot.lower + robot.upper) / 2) / np.maximum(robot.upper - robot.lower, 1e-9)
     near = free[np.argsort(away.max(axis=1), kind="stable")[:HOMES]]
