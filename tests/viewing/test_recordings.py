@@ -110,7 +110,9 @@ def test_bodies_are_red_and_the_contact_marked_while_they_overlap(robot, tmp_pat
     post = Sphere("post", np.eye(4), 0.1)
     overlap = PlayedEvent(0.5, 0.8, "collision", "fail", ("link_2", "post"))
     contact = Mark(0.5, 0.8, (0.1, 0.2, 0.3), (0.1, 0.2, 0.3), "first contact")
-    run = Run("into it", "It goes.", np.linspace(0, 1, 11), np.zeros((11, 6)), [overlap], [contact], outcome="collides")
+    fast = [PlayedEvent(t, t + 0.1, f"too fast: J{joint}", "caution") for t, joint in ((0.1, 1), (0.15, 2), (0.3, 1))]
+    events = [overlap, *fast]
+    run = Run("into it", "It goes.", np.linspace(0, 1, 11), np.zeros((11, 6)), events, [contact], outcome="collides")
     shown = Recorded(robot, "arm", "trajectory", "Look.", [run], scene=Scene("a post", (post,)))
     write_recording(shown, tmp_path / "out.rrd")
     rows = RrdReader(tmp_path / "out.rrd").stream().collect().reader(index=TIMELINE).to_pandas()
@@ -126,7 +128,8 @@ def test_bodies_are_red_and_the_contact_marked_while_they_overlap(robot, tmp_pat
         assert changes(entity) == [(0.5, True), (0.8, False)], entity
     assert not [column for column in rows.columns if "link_3/touching" in column]
     texts = [text[0] for text in rows["/trajectory/events:TextLog:text"].dropna()]
-    assert texts == ["0.000 s: into it: collides", "0.500 s: collision (0.500 s into it)"]
+    told = ["0.100 s: too fast: J1 (0.100", "0.300 s: too fast: J1 (0.300", "0.500 s: collision (0.500"]
+    assert texts == ["0.000 s: into it: collides", *(f"{each} s into it)" for each in told)]
 
 
 @pytest.mark.parametrize("recording", RECORDINGS)

@@ -539,13 +539,18 @@ def _send_curves(stream: rr.RecordingStream, entity: str, clock: Clock, values: 
 
 
 def _send_events(stream: rr.RecordingStream, entity: str, clock: Clock) -> None:
-    """The run's outcome, then its events, each with its time here and on the run's own clock."""
+    """The run's outcome, then its events, each with its time here and on the run's own clock; of those alike by the
+    word before the colon, such as rates of several joints near one pose, the first while any lasts."""
     run, start = clock.run, clock.start
     rows: list[tuple[float, str, Weight]] = (
         [(0.0, f"{start:.3f} s: {run.name}: {run.outcome}", run.status)] if run.outcome else []
     )
+    ends: dict[tuple[str, Weight], float] = {}
     for each in sorted(run.events, key=lambda each: each.t):
-        rows.append((each.t, f"{start + each.t:.3f} s: {each.text} ({each.t:.3f} s into it)", each.status))
+        kind = each.text.partition(":")[0], each.status
+        if each.t > ends.get(kind, -1.0):
+            rows.append((each.t, f"{start + each.t:.3f} s: {each.text} ({each.t:.3f} s into it)", each.status))
+        ends[kind] = max(each.until, ends.get(kind, 0.0))
     if rows:
         columns = rr.TextLog.columns(
             text=[text for _, text, _ in rows],
