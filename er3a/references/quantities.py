@@ -65,6 +65,7 @@ class ModelState:
     slides: Flags | None = None
     sliding: Flags | None = None
     coupling: Reals | None = None
+    _turns: dict[tuple[Pose, Rotation3], Reals] = field(default_factory=dict, init=False)
 
     def at(self, pose: Pose) -> Reals:
         """Frames at a pose.
@@ -78,6 +79,22 @@ class ModelState:
         T : (..., m + 1, 4, 4), base frame, m; the last is the flange
         """
         return self.frames[..., self.index[pose], :, :, :]
+
+    def turned(self, pose: Pose, stated: Rotation3) -> Reals:
+        """How the flange is turned from a stated orientation at a pose.
+
+        Parameters
+        ----------
+        stated : rows of a rotation matrix
+
+        Returns
+        -------
+        turn : (..., 3), rotation vector, deg, base frame; worked out once for its three coordinates
+        """
+        if (pose, stated) not in self._turns:
+            R = self.at(pose)[..., FRAME_OF_POINT["flange"], :3, :3]
+            self._turns[pose, stated] = rotation_vectors_deg(R @ np.array(stated).T)
+        return self._turns[pose, stated]
 
     def axis(self, joint: int) -> tuple[Reals, Reals]:
         """A joint's axis line in the zero pose: that of the first row that it moves.
@@ -323,8 +340,7 @@ class FlangeTurn(QuantityAtPose):
         -------
         coordinate : (...), deg, base frame
         """
-        R = state.at(self.pose)[..., FRAME_OF_POINT["flange"], :3, :3]
-        return rotation_vectors_deg(R @ np.array(self.stated).T)[..., COORDINATES.index(self.coordinate)]
+        return state.turned(self.pose, self.stated)[..., COORDINATES.index(self.coordinate)]
 
     @property
     def vector(self) -> Hashable:
