@@ -70,10 +70,13 @@ def frames(rows: Rows, q: np.ndarray, joints: int = 6) -> np.ndarray:
     found = [T]
     for j in range(joints):
         theta = rows["direction"][:, None, j] * q[None, :, j] + rows["offset"][:, None, j]
-        a, d, alpha = (np.broadcast_to(rows[name][:, None, j], theta.shape) for name in ("a", "d", "alpha"))
-        c, s, ca, sa, none = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha), np.zeros_like(theta)
-        link = [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [none, sa, ca, d], [none] * 3 + [none + 1]]
-        T = T @ np.moveaxis(np.array(link), (0, 1), (-2, -1))
+        a, d, alpha = (rows[name][:, None, j] for name in ("a", "d", "alpha"))
+        c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+        link = np.zeros((*theta.shape, 4, 4))
+        link[..., 0, 0], link[..., 0, 1], link[..., 0, 2], link[..., 0, 3] = c, -s * ca, s * sa, a * c
+        link[..., 1, 0], link[..., 1, 1], link[..., 1, 2], link[..., 1, 3] = s, c * ca, -c * sa, a * s
+        link[..., 2, 1], link[..., 2, 2], link[..., 2, 3], link[..., 3, 3] = sa, ca, d, 1.0
+        T = T @ link
         found.append(T)
     return np.stack(found, axis=2)
 
