@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -38,7 +38,15 @@ from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.field_of_view import in_sight
 from er3a.vision.grasp_motion import PARTS
-from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
+from er3a.vision.grasping import (
+    ChosenGrasp,
+    DetectedObject,
+    GraspNeeds,
+    GraspPlan,
+    GraspTask,
+    nearest_place,
+    plan_grasp,
+)
 from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
 from er3a.vision.point_error import SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
@@ -202,7 +210,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     calibration = calibration_result(head, found, images)
     doubt = _doubt(calibration, found.touch)
     planned = [] if doubt else list(_planned(cell, scene, settings, limits_of(robot, motions), study.seed))
-    objects = tuple(_object(robot, entry, cell.place(entry), plan) for entry, plan in planned)
+    objects = tuple(_object(robot, entry, cell.place(entry), plan, moved) for entry, plan, moved in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
     open_points = (
@@ -373,12 +381,14 @@ def _doubt(found: model.CalibrationResult, touch: TouchCheck | None) -> Finding 
     return touch.contradiction if touch else None
 
 
-Planned = list[tuple[ObjectEntry, GraspPlan]]
+Moved = tuple[Reals, ChosenGrasp] | None
+Planned = list[tuple[ObjectEntry, GraspPlan, Moved]]
 
 
 def _planned(
     cell: _Cell, scene: Scene | None, settings: VisionSettings, limits: JointLimits, seed: int
-) -> Iterator[tuple[ObjectEntry, GraspPlan]]:
+) -> Iterator[tuple[ObjectEntry, GraspPlan, Moved]]:
+    """Of each object its grasp, or where it could be grasped."""
     gripper = cell.file.gripper
     tolerance = (*(mm / 1000 for mm in gripper.tolerance_mm), *np.radians(gripper.tolerance_deg))
     needs = GraspNeeds(
@@ -392,10 +402,24 @@ def _planned(
     task = GraspTask(cell.robot, Bodies(cell.robot, scene), cell.home, needs, limits, speed, seed)
     for entry in cell.file.objects:
         target = entry.detected()
-        yield entry, plan_grasp(task, target, cell.place(entry), partial(cell.error_at, target))
+        place = cell.place(entry)
+        plan, moved = plan_grasp(task, target, place, partial(cell.error_at, target)), None
+        if plan.chosen is None:
+            to_camera = entry.pose() @ inverted(place)
+
+            def may_be_at(T: Reals, to_camera: Reals = to_camera) -> bool:
+                seen = in_sight(cell.file.view.view(), (to_camera @ T)[None, :3, 3])[0]
+                return bool(seen) and not gaps_in_solids(scene, [("", T[:3, 3], 0.0)])
+
+            def plan_at(T: Reals, target: DetectedObject = target, to_camera: Reals = to_camera) -> GraspPlan:
+                there = replace(target, T_camera_object=to_camera @ T)
+                return plan_grasp(task, there, T, partial(cell.error_at, there))
+
+            moved = nearest_place(task, target, place, may_be_at, plan_at)
+        yield entry, plan, moved
 
 
-def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan) -> model.ObjectResult:
+def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan, moved: Moved) -> model.ObjectResult:
     error_mm = error_deg = None
     if (error := plan.error) is not None:
         causes = error.camera, error.calibration, error.repeatability, error.table, error.whole
@@ -413,6 +437,8 @@ def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan) -> mode
         error_mm=error_mm,
         error_deg=error_deg,
         grasp=_grasp(robot, plan.chosen) if plan.chosen else None,
+        moved_to_mm=tuple((1000 * moved[0][:3, 3]).tolist()) if moved else None,
+        moved_q_deg=tuple(shown(robot, moved[1].q).tolist()) if moved else None,
     )
 
 
@@ -506,7 +532,7 @@ def figures_of(
 
 def _all_ways(robot: Robot, planned: Planned) -> model.PathRows:
     """The motions of all grasps."""
-    found = (_ways(robot, entry.name, plan.chosen) for entry, plan in planned if plan.chosen)
+    found = (_ways(robot, entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen)
     return model.PathRows.stacked(found).of_joints(robot.slides)
 
 

@@ -142,6 +142,9 @@ class ObjectResult:
     ----------
     error_mm, error_deg : None where nothing is grasped
     poses, solutions, followed : grasps in all turns, their joint solutions, and those followed along both lines
+    moved_to_mm : of one that is not grasped, the nearest place at the same height at which it could be; None where
+        none was found
+    moved_q_deg : of the arm, in mm for a prismatic joint, as it grasps it there
     """
 
     name: str
@@ -158,6 +161,8 @@ class ObjectResult:
     poses: int
     solutions: int
     followed: int
+    moved_to_mm: Three | None = None
+    moved_q_deg: tuple[float, ...] | None = None
 
 
 class VisionSummary(Summary):
