@@ -39,8 +39,6 @@ FOLLOWED = 6  # candidates that are followed along the lines
 WIDEST_STEP = 0.35  # rad between waypoints of an approach; more is a jump
 LEG_POINTS = 41
 PLANNING_TOLERANCE = 1e-3  # m
-PLACE_STEP, PLACES, DIRECTIONS = 0.01, 60, 24  # m, circles and places on each, at which an object might be
-PLACES_PLANNED = 20  # at most, since each takes about as long as an object
 TIE = 6  # decimals: turns of a symmetrical object tie, and rounding of another processor must not choose
 
 
@@ -187,12 +185,17 @@ def plan_grasp(
     -------
     plan : the grasp with its probability, or why there is none; and how many were tried
     """
-    candidates, poses = _candidates(task, target, T_base_object)
-    left, refusal = _judged(task, candidates, poses)
+    poses = _poses(target, T_base_object)
+    candidates = [
+        _Candidate(name, turn, T, q)
+        for name, turn, T in poses
+        for q in inverse(task.robot, T, task.home, self_motion_rows=True).q
+    ]
+    left, refusal = _judged(task, candidates, len(poses))
     followed = left[:FOLLOWED]
     plans = [_followed(task, each, target) for each in followed]
     good = [plan for plan in plans if isinstance(plan, ChosenGrasp)]
-    counts, likeliest = (poses, len(candidates), len(followed)), 0.0
+    counts, likeliest = (len(poses), len(candidates), len(followed)), 0.0
     for best in sorted(good, key=lambda plan: -round(plan.margin, TIE)):
         error = error_at(best.q)
         probability = success_probability(best, target, T_base_object, error.whole, task.needs)
@@ -208,50 +211,13 @@ def plan_grasp(
     return GraspPlan(None, refusal, *counts)
 
 
-def nearest_place(
-    task: GraspTask,
-    target: DetectedObject,
-    T_base_object: Reals,
-    may_be_at: Callable[[Reals], bool],
-    plan_at: Callable[[Reals], GraspPlan],
-) -> tuple[Reals, ChosenGrasp] | None:
-    """The nearest place at the same height at which an object can be grasped, of places on circles around it.
-
-    Parameters
-    ----------
-    T_base_object : (4, 4), m, where it is
-    may_be_at : whether an object may be at a pose (4, 4)
-    plan_at : what :func:`plan_grasp` finds there
-
-    Returns
-    -------
-    found : its pose there (4, 4), and the grasp; None where ``PLACES_PLANNED`` places that pass at the grasp fail
-        later, or none passes
-    """
-    planned = 0
-    for far in PLACE_STEP * np.arange(1, PLACES + 1):
-        for turn in 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
-            T = translation(far * np.cos(turn), far * np.sin(turn), 0) @ T_base_object
-            if not may_be_at(T) or not _judged(task, *_candidates(task, target, T))[0]:
-                continue
-            planned += 1
-            if (chosen := plan_at(T).chosen) is not None:
-                return T, chosen
-            if planned == PLACES_PLANNED:
-                return None
-    return None
-
-
-def _candidates(task: GraspTask, target: DetectedObject, T_base_object: Reals) -> tuple[list[_Candidate], int]:
-    """The joint solutions of all grasps in all turns, and how many poses these are of."""
+def _poses(target: DetectedObject, T_base_object: Reals) -> list[tuple[str, float, Reals]]:
     count = target.turns or ANY_TURN
-    poses = [
+    return [
         (grasp.name, float(turn), T_base_object @ rot_z(turn) @ grasp.T_object_tool)
         for grasp in target.grasps
         for turn in 2 * np.pi * np.arange(count) / count
     ]
-    solved = ((each, inverse(task.robot, each[2], task.home, self_motion_rows=True).q) for each in poses)
-    return [_Candidate(*each, q) for each, found in solved for q in found], len(poses)
 
 
 def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[list[_Candidate], Finding | None]:

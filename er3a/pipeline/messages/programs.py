@@ -243,9 +243,9 @@ def _(found: Finding) -> str:
 
 @advises("motion_collides")
 def _(found: Finding) -> str:
-    if "end_mm" in found.params:
-        return sentence("remedy.end", end_mm=found.end_mm, margin_mm=found.margin_mm)
     there = next((touch for touch in found.touches if touch.at_target), None)
+    if there and "end_mm" in found.params:
+        return sentence("remedy.end", end_mm=found.end_mm, margin_mm=found.margin_mm)
     pair = (there or found.touches[0]).pair
     if is_one(pair, "link_and_solid"):
         return sentence("remedy.solid", there=there is not None, name=pair.solid)

@@ -10,7 +10,7 @@ import numpy as np
 from er3a.collision.along import bodies_of, clearance_along
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
-from er3a.finding import Finding, fact, is_one
+from er3a.finding import fact, is_one
 from er3a.geometry.transforms import inverted
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -69,7 +69,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     motions: list[model.ProgramMotion] = []
     for entry in listed.programs:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
-        check = _with_ends(check, task, options)
+        check = replace(check, findings=tuple(_ended(check, each, task, options) for each in check.findings))
         motion, starts = _motion(entry.name, check, robot)
         summaries.append(_summary(entry, check, starts))
         if any(is_one(each.finding, "way_not_known") for each in check.findings):
@@ -134,33 +134,24 @@ def _options(study: Study, name: str, listed: ProgramsFile) -> CheckOptions:
     )
 
 
-def _with_ends(check: ProgramCheck, task: MotionTask, options: CheckOptions) -> ProgramCheck:
-    """A check whose collisions also say where their line may end, as paths do."""
-    if not any(is_one(each.finding, "motion_collides") for each in check.findings):
-        return check
-    arm = Obstacles(task.robot, options.scene, check.motions, task.tolerance, options.assumed_margin)
-    task = replace(task, bodies=arm.bodies)
-    findings = tuple(replace(each, finding=_ended(check, each, task, options)) for each in check.findings)
-    return replace(check, findings=findings)
-
-
-def _ended(check: ProgramCheck, found: LocatedFinding, task: MotionTask, options: CheckOptions) -> Finding:
-    """A collision of a line that is carried out once, with where and when (s of its motion) the line may end: the tool
-    point in the line's base, mm, and how clear the arm is up to there."""
-    lines = [number for number in check.motions if check.execution.steps[number].place == found.place]
-    motion = check.motions[lines[0]] if len(lines) == 1 else None
+def _ended(check: ProgramCheck, found: LocatedFinding, task: MotionTask, options: CheckOptions) -> LocatedFinding:
+    """What was found; of a collision towards which one line goes once also where and when (s of its motion) the line
+    may end: the tool point in the line's base, mm, and how clear the arm is up to there."""
+    motions = [motion for number, motion in check.motions.items() if check.execution.steps[number].place == found.place]
+    motion = motions[0] if len(motions) == 1 else None
     if not is_one(found.finding, "motion_collides") or motion is None or motion.path is None or motion.base is None:
-        return found.finding
-    curve, tolerance = curve_of(motion.path), task.tolerance
+        return found
+    bodies = Obstacles(task.robot, options.scene, check.motions, task.tolerance, options.assumed_margin).bodies
+    task, curve = replace(task, bodies=bodies), curve_of(motion.path)
     times = curve.times
-    along = clearance_along(task.bodies, curve.joints, curve.rate_bounds, times, times[[0, -1]], tolerance)
+    along = clearance_along(bodies, curve.joints, curve.rate_bounds, times, times[[0, -1]], task.tolerance)
     others = [at for each, at in motion.findings.items() if at is not None and not is_one(each, "motion_collides")]
     last = safe_stop(task, curve, times, along.contacts, others, margin_of(task, options.assumed_margin))
     if last is None:
-        return found.finding
+        return found
     pose = inverted(motion.base) @ forward(motion.arm, curve.joints(np.array([last.kept_to])))[0]
     end = tuple((1000 * pose[:3, 3]).tolist())
-    return found.finding.but(end_mm=end, end_s=last.kept_to, margin_mm=1000 * last.margin)
+    return replace(found, finding=found.finding.but(end_mm=end, end_s=last.kept_to, margin_mm=1000 * last.margin))
 
 
 def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, float]) -> model.ProgramSummary:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
 from er3a.files.vision_file import ObjectEntry, VisionFile, load_vision
 from er3a.files.yaml_file import load
 from er3a.finding import Finding, fact
-from er3a.geometry.transforms import inverted, quaternion_of, rpy_of
+from er3a.geometry.transforms import inverted, quaternion_of, rpy_of, translation
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
@@ -44,7 +45,6 @@ from er3a.vision.grasping import (
     GraspNeeds,
     GraspPlan,
     GraspTask,
-    nearest_place,
     plan_grasp,
 )
 from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
@@ -166,6 +166,7 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
 
 STAGE_NAME = "vision"
 LEG_ROWS = 13
+DIRECTIONS, MOST_FOLLOWED = 24, 20  # around an object, and places that take as long as an object does
 
 
 def compute(study: Study, name: str) -> model.VisionResults:
@@ -402,21 +403,26 @@ def _planned(
     task = GraspTask(cell.robot, Bodies(cell.robot, scene), cell.home, needs, limits, speed, seed)
     for entry in cell.file.objects:
         target = entry.detected()
-        place = cell.place(entry)
-        plan, moved = plan_grasp(task, target, place, partial(cell.error_at, target)), None
-        if plan.chosen is None:
-            to_camera = entry.pose() @ inverted(place)
+        plan = plan_grasp(task, target, cell.place(entry), partial(cell.error_at, target))
+        yield entry, plan, None if plan.chosen else _moved(cell, scene, task, entry)
 
-            def may_be_at(T: Reals, to_camera: Reals = to_camera) -> bool:
-                seen = in_sight(cell.file.view.view(), (to_camera @ T)[None, :3, 3])[0]
-                return bool(seen) and not gaps_in_solids(scene, [("", T[:3, 3], 0.0)])
 
-            def plan_at(T: Reals, target: DetectedObject = target, to_camera: Reals = to_camera) -> GraspPlan:
-                there = replace(target, T_camera_object=to_camera @ T)
-                return plan_grasp(task, there, T, partial(cell.error_at, there))
-
-            moved = nearest_place(task, target, place, may_be_at, plan_at)
-        yield entry, plan, moved
+def _moved(cell: _Cell, scene: Scene | None, task: GraspTask, entry: ObjectEntry) -> Moved:
+    """The nearest place in the camera's view at an object's height where it can be grasped, its pose (4, 4), m, and the
+    grasp; None where the first ``MOST_FOLLOWED`` places that have a candidate fail later."""
+    place, view, followed = cell.place(entry), cell.file.view.view(), 0
+    for far, turn in product(1e-3 * np.array(model.CIRCLES_MM), np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)):
+        T = translation(far * np.cos(turn), far * np.sin(turn), 0) @ place
+        there = replace(entry.detected(), T_camera_object=entry.pose() @ inverted(place) @ T)
+        if not in_sight(view, there.T_camera_object[None, :3, 3])[0] or gaps_in_solids(scene, [("", T[:3, 3], 0.0)]):
+            continue
+        plan = plan_grasp(task, there, T, partial(cell.error_at, there))
+        if plan.chosen:
+            return T, plan.chosen
+        followed += plan.followed > 0
+        if followed == MOST_FOLLOWED:
+            break
+    return None
 
 
 def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan, moved: Moved) -> model.ObjectResult:

@@ -134,6 +134,9 @@ class GraspResult:
     duration_s: float
 
 
+CIRCLES_MM = range(10, 610, 10)  # around an object, on which places are tried for it
+
+
 @dataclass(frozen=True)
 class ObjectResult:
     """A detected object, where it is in the base's frame, and what comes of it.

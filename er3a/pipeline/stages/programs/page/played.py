@@ -90,8 +90,9 @@ def _marks(program: ProgramSummary, rows: ProgramMotion) -> list[Mark]:
     marks = []
     for found in program.findings:
         if (end := _end_s(found)) is not None:
+            said = tr("safe end: {far} mm clear", far=fixed(found.finding.margin_mm, 1))
             x, y, z = (float(np.interp(end, rows.t_s, own)) / 1000 for own in rows.xyz_mm.T)
-            marks.append(Mark(end - MOMENT, float(rows.t_s[-1]), (x, y, z), (x, y, z), tr("safe end")))
+            marks.append(Mark(end - MOMENT, float(rows.t_s[-1]), (x, y, z), (x, y, z), said))
         if place := found.finding.params.get("target_m"):
             tip = rows.xyz_mm[np.searchsorted(rows.t_s, (found.program_s or 0.0) - MOMENT)] / 1000
             marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(place), tr("not reachable")))
@@ -109,8 +110,7 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
     if is_one(finding, "motion_collides"):
         begun = start - (found.motion_s or 0.0)  # of the line's motion
         touches = [(begun + each.t_s, each.pair) for each in finding.touches]
-        ends = [] if (last := _end_s(found)) is None else [_end_event(last, finding)]
-        return ends + [
+        return [
             PlayedEvent(t, max(t, end), tr("collision: {pair}", pair=say(pair)), weight, names_of(pair))
             for t, pair in touches
         ]
@@ -119,10 +119,6 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
         return [PlayedEvent(start, end, rates_text([finding]), weight, joints=((finding.joint, needed),))]
     joints = ((finding.joint, ""),) if is_one(finding, "above_limit", "below_limit") else ()
     return [PlayedEvent(start, end, in_few_words(say(finding)), weight, joints=joints)]
-
-
-def _end_event(t: float, found: Finding) -> PlayedEvent:
-    return PlayedEvent(t, t, tr("{far} mm clear here", far=fixed(found.margin_mm, 1)), "plain")
 
 
 def in_few_words(text: str) -> str:

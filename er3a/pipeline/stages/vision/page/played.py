@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -17,12 +16,11 @@ from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
-from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, VisionResults, VisionSummary
+from er3a.pipeline.stages.vision.model import CIRCLES_MM, ObjectResult, PoseEstimate, VisionResults, VisionSummary
 from er3a.pipeline.viewing.drawn import Shape
 from er3a.pipeline.viewing.palette import REFERENCE, VERDICTS
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
-from er3a.vision.grasping import PLACE_STEP, PLACES
 
 WAYS = {"move": N_("move to the approach"), "approach": N_("straight to the grasp"), "retreat": N_("retreat")}
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
@@ -37,15 +35,9 @@ CONE = [*SIDES, *(side[::-1] for side in SIDES)]  # seen from both sides
 def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[PlayedMotion]:
     """The way to each object and away from it, with the arm before the approach drawn pale; the arm where it waits for
     an object that it does not grasp."""
-    home, sight = meant(robot, np.array(task.home_deg)), _sight(results.summary)
-    found = [_motion(robot, results, each, home) for each in results.summary.objects]
-    return [
-        *(
-            replace(motion, marks=[*motion.marks, *(replace(ray, t1=float(motion.t[-1])) for ray in own)])
-            for motion, own in zip(found, sight)
-        ),
-        *(_moved(robot, each) for each in results.summary.objects if each.moved_to_mm),
-    ]
+    home, objects = meant(robot, np.array(task.home_deg)), results.summary.objects
+    moved = [_moved(robot, each) for each in objects if each.moved_to_mm]
+    return [*(_motion(robot, results, each, home) for each in objects), *moved]
 
 
 def moved_name(each: ObjectResult) -> str:
@@ -56,7 +48,7 @@ def moved_name(each: ObjectResult) -> str:
 def moved_text(each: ObjectResult) -> str:
     """How far an object has to be moved to be grasped, and to where; that it can't be, if no place was found."""
     if each.moved_to_mm is None:
-        return tr("No place found within {far} mm.", far=fixed(1000 * PLACE_STEP * PLACES, 0))
+        return tr("No place found within {far} mm.", far=max(CIRCLES_MM))
     at = ", ".join(fixed(value, 0) for value in each.moved_to_mm)
     return tr("Move {name} by {far}, to ({at}) mm.", name=each.name, far=_far(each.xyz_mm, each.moved_to_mm), at=at)
 
@@ -138,20 +130,11 @@ def _corners(task: VisionFile, far: float) -> Reals:
 
 
 def _down(T: Reals, corners: Reals, summary: VisionSummary) -> Reals:
-    """The corners (4, 3), m, of what a camera at ``T`` sees, but no lower than where its lowest object stands."""
+    """The corners (4, 3), m, of what a camera at ``T`` sees, down to the foot of its lowest object."""
     lowest = min((each.xyz_mm[2] / 1000 for each in summary.objects), default=-np.inf) - OBJECT_M[2] / 2
     falls = -(corners @ T[2, :3])
     shares = np.divide(T[2, 3] - lowest, falls, out=np.ones(4), where=falls > T[2, 3] - lowest)
     return corners * shares[:, None]
-
-
-def _sight(summary: VisionSummary) -> list[list[Mark]]:
-    """Of each object the line from a fixed camera to it; none of a camera that moves."""
-    found = summary.calibration
-    if found is None or found.setup != "eye_to_hand":
-        return [[] for _ in summary.objects]
-    start = _metres(found.hand_eye.xyz_mm)
-    return [[Mark(0.0, 0.0, start, _metres(each.xyz_mm), "")] for each in summary.objects]
 
 
 def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:
