@@ -280,7 +280,7 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
     target : T_world_tool (4, 4), m, of a line's or arc's end; None for a joint move
     """
     found: Moments = {}
-    curve = _curve(path)
+    curve = curve_of(path)
     if path.ahead is not None and target is not None:
         found[_stopped(path, path.ahead, target)] = curve.duration  # where the arm still is
     faults = motion_faults.limit_intervals(path.arm, curve)
@@ -295,7 +295,7 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
     return found
 
 
-def _curve(path: MotionPath) -> PiecewiseMotion:
+def curve_of(path: MotionPath) -> PiecewiseMotion:
     """The motion in time: cubics in the share of the way, by its law."""
     law, share = path.law, path.share
     if len(share) == 1:

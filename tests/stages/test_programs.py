@@ -31,7 +31,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.motion_faults import rate_fault
-from er3a.program_check.check_program import CheckOptions
+from er3a.program_check.check_program import CheckOptions, check_program
 
 ROBOTS = ("er3a_c60", "er3_600")
 
@@ -123,6 +123,28 @@ def test_what_is_out_of_reach_in_later_passes_alone_says_so(stored):
     assert ("later_out_of_reach" in drifts, "way_out_of_reach" in drifts) == (True, False)
     assert "way_out_of_reach" in ends
     assert "later_out_of_reach" not in codes(replace(results, instructions=always))[0]
+
+
+def test_a_line_that_ends_where_advised_keeps_its_margin(study, stored, tmp_path):
+    results = stored["er3a_c60"].results
+    program = next(each for each in results.summary.programs if each.name == "collision_with_table")
+    (hit,) = (each for each in program.findings if each.finding.code == "motion_collides")
+    x, y, z = hit.finding.end_mm
+    text = Path(program.file).read_text(encoding="utf-8")
+
+    def clearance(height: float) -> float:
+        file = tmp_path / "mended.src"
+        file.write_text(text.replace("X 380.00, Y 180.00, Z -60.00", f"X {x:.1f}, Y {y:.1f}, Z {height:.1f}"))
+        scene = study.scene("er3a_c60", "trajectory")
+        check = check_program(file, study.robot("er3a_c60"), CheckOptions(scene=scene))
+        return next(each.least_clearance_mm for each in check.verdicts if each.line == 10)
+
+    assert clearance(z) == pytest.approx(hit.finding.margin_mm, abs=0.2)
+    assert clearance(z - 2) < hit.finding.margin_mm - 1
+    (fault,) = (each for each in faults(results) if each.name == program.name)
+    end = hit.program_s - hit.motion_s + hit.finding.end_s
+    assert fault.instead[1].endswith(f"until={round(end, 9)}#{program.name}")
+    assert f"({x:.1f}, {y:.1f}, {z:.1f}) mm" in fault.to_do
 
 
 @pytest.mark.long

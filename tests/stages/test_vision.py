@@ -11,13 +11,15 @@ import yaml
 from PIL import Image
 
 from er3a.files.kept_files import ROOT
+from er3a.geometry.transforms import inverted
 from er3a.pipeline.messages import vision  # noqa: F401
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.vision.compute import figures_of, verdict_of
+from er3a.pipeline.stages.vision.compute import compute, figures_of, verdict_of
 from er3a.pipeline.stages.vision.model import VisionResults
+from er3a.pipeline.stages.vision.page.played import placed
 from er3a.pipeline.stages.workspace.page.tray import sound_motions
 from er3a.pipeline.study import load_study
 from testing.hand_eye_sets import pose
@@ -61,6 +63,26 @@ def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
         "box_far_off": "not graspable",
     }
     assert {each.refusal.code for each in summary.objects if each.refusal} == {"grasp_collides", "grasp_out_of_reach"}
+
+
+def test_an_object_that_is_moved_as_advised_is_grasped(study, folders, tmp_path):
+    summary = read_results(folders["er3a_c60"], VisionResults).results.summary
+    missed = [each for each in summary.objects if not each.grasp]
+    file = ROOT / "data/vision/er3a_c60.yaml"
+    cell = yaml.safe_load(file.read_text(encoding="utf-8"))
+    cell["calibration"] = str(file.parent / cell["calibration"])
+    cell["objects"] = [each for each in cell["objects"] if each["name"] in {one.name for one in missed}]
+    to_camera = inverted(placed(summary.calibration.hand_eye))
+    for entry, each in zip(cell["objects"], missed):
+        assert each.moved_to_mm[2] == pytest.approx(each.xyz_mm[2])
+        entry["xyz_mm"] = (1000 * to_camera[:3, 3] + to_camera[:3, :3] @ each.moved_to_mm).tolist()
+    (tmp_path / "moved.yaml").write_text(yaml.safe_dump(cell), encoding="utf-8")
+    entry = study.entry("er3a_c60").model_copy(update={"vision": tmp_path / "moved.yaml"})
+    moved = compute(study.model_copy(update={"robots": {"er3a_c60": entry}}), "er3a_c60").summary.objects
+    assert [each.outcome for each in moved] == ["grasped", "grasped"]
+    for each, where in zip(moved, missed):
+        assert each.xyz_mm == pytest.approx(where.moved_to_mm)
+        assert each.grasp.q_deg == pytest.approx(where.moved_q_deg, abs=0.01)
 
 
 def test_objects_within_the_margin_of_assumed_shapes_count_apart(folders):

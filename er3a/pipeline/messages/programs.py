@@ -162,6 +162,7 @@ TEXTS = texts(
         "load_above_payload": "{mass_kg:g} kg on the flange; payload {payload_kg:g} kg",
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
         "remedy.limit": "Keep J{joint} within {limit:g}°; turn or move a target given as a pose.",
+        "remedy.end": "End it at ({end_mm:.1f, }) mm: {margin_mm:.1f} mm clear.",
         "remedy.solid": (
             "[Add a via point around {name}: the target itself is clear.{there:!}][Move the target away from "
             "{name}.{there:?}]"
@@ -243,6 +244,8 @@ def _(found: Finding) -> str:
 @advises("motion_collides")
 def _(found: Finding) -> str:
     there = next((touch for touch in found.touches if touch.at_target), None)
+    if there and "end_mm" in found.params:
+        return sentence("remedy.end", end_mm=found.end_mm, margin_mm=found.margin_mm)
     pair = (there or found.touches[0]).pair
     if is_one(pair, "link_and_solid"):
         return sentence("remedy.solid", there=there is not None, name=pair.solid)

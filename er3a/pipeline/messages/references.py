@@ -28,7 +28,7 @@ STATUS_WORDS = words(
         "settled_up_to_signs": "settled but for signs",
         "weak": "weak",
         "contradicted": "contradicted",
-        "consistent": "its own source only",
+        "consistent": "one source only",
         "open": "open",
         "gauge": "free choice",
         "given": "given",

@@ -14,7 +14,6 @@ from er3a.pipeline.stages.programs.page.played import faults as program_faults
 from er3a.pipeline.stages.trajectory.model import TrajectoryResults
 from er3a.pipeline.stages.trajectory.page.played import faults as path_faults
 from er3a.pipeline.stages.validation.model import ValidationResults
-from er3a.pipeline.stages.validation.page.evidence_section import known_alone
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import sound_motions
@@ -51,7 +50,7 @@ def _(results: ValidationResults) -> Glance:
         return value, tr("sources differ by {off}", off=with_unit(fixed(max(stated) - min(stated), 1), conflict.unit))
     if not evidence or not evidence.unconfirmed:
         return value, ""
-    return value, tr("{count} of {all} open", count=len(evidence.unconfirmed), all=known_alone(evidence))
+    return value, tr("{count} to confirm", count=len(evidence.unconfirmed))
 
 
 @glance.register

@@ -114,7 +114,7 @@ function draw() {
   if (space.target !== motion.target) Object.assign(space, { target: motion.target, distance: (space.distance * motion.length) / space.length, length: motion.length });
   if (space.turned !== motion.turned) Object.assign(space, { azimuth: space.azimuth + motion.turned - (space.turned ?? 0), turned: motion.turned });
   space.begin();
-  space.floor(column(table.base, 3), data.size / 10, floor);
+  space.floor(column(table.base, 3), data.size / 10, floor, Boolean(unjudged));
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
   arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value, k === 0 && Boolean(wrong)));
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
@@ -143,6 +143,7 @@ function draw() {
   const [from, to] = poses.map((own) => column(own.at(-1), 3));
   if (wrong) apart = `${fixed(1000 * Math.hypot(...subtract(from, to)), 0)} mm`;
   if (wrong) marks.push({ from, to, text: apart });
+  if (wrong && from[2] < floor) space.word(words.through, from, page.touching);
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
   space.keepClear([...axes.flatMap(([a, b]) => [b, scaled(add(a, b), 0.5)]), motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) {

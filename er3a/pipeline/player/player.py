@@ -95,7 +95,7 @@ def player(
     for own, motion in zip(data["motions"], shown):
         if motion.events and not beside:  # what nothing is said of is the one before it in another way, and seen alike
             gravest = min(reversed(motion.events), key=lambda event: GRAVEST.index(event.status))
-            turned = _turned(robot, motion, data["opened"][1] if motion is first else gravest.t, data)
+            turned = best_turn(robot, motion, data["opened"][1] if motion is first else gravest.t, data)
         own |= _frame(data, robots, motion, turned) | {"turned": turned}
     data |= {key: own[key] for own in data["motions"] if own["name"] == first.name for key in VIEW}
     return Markup(
@@ -114,7 +114,7 @@ def player(
 def picture_at(robot: Robot, motion: PlayedMotion, t: float, scene: Scene | None) -> bytes:
     """A WebP picture of an arm and its scene at time ``t`` (s) of a motion, as a player would open."""
     data = _data(robot, [motion], scene, (), ()) | {"opened": (motion.name, t)}
-    turned = _turned(robot, motion, t, data)
+    turned = best_turn(robot, motion, t, data)
     data |= _frame(data, (robot,), motion, turned) | {"turned": turned}
     return _still((robot,), motion, data).picture()
 
@@ -181,7 +181,7 @@ def _corners(shape: Shape) -> Reals:
 def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, turned: float) -> dict[str, Any]:
     """How much has to be seen (m), and around which point, for the picture to hold the arms on their ways and what is
     around them, as far as that is near; ``turned``, rad: of the eye."""
-    bodies = [each for each in data["scene"] if not each.get("large") and ("pale" not in each or "own" in each)]
+    bodies = [each for each in data["scene"] if not each.get("large") and "pale" not in each]
     points = [_corners(shape) for shape in bodies]
     for robot, q in zip(robots, (motion.q, *motion.beside)):
         points += [poses_at(robot, q[k])[:, :3, 3] for k in np.linspace(0, len(q) - 1, FRAMED).astype(int)]
@@ -201,7 +201,7 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, 
     return {"length": float(length), "target": (middle @ axes).tolist()}
 
 
-def _turned(robot: Robot, motion: PlayedMotion, t: float, data: dict[str, Any]) -> float:
+def best_turn(robot: Robot, motion: PlayedMotion, t: float, data: dict[str, Any]) -> float:
     """By how much (rad) the eye is turned to see the arm at a time (s), and its way, from the side, walls along them,
     and no body before it."""
     q, way = [_at(motion, motion.q, t), *motion.ghosts], forward(robot, motion.q)[:, :3, 3]

@@ -34,7 +34,8 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.player import AXES, LOOKS, SPACE, drawing_head, table_data
+from er3a.pipeline.player.motions import at_rest
+from er3a.pipeline.player.player import AXES, LOOKS, SPACE, best_turn, drawing_head, table_data
 from er3a.pipeline.results import Provenance, input_records, is_computed, read_foundation
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
@@ -277,15 +278,17 @@ def write_panel(
         [*known, *regular, *(middle - steps[:, None] - steps).reshape(-1, robot.joints)], robot.lower, robot.upper
     )
     opened = rows[(Bodies(robot, scene).free(rows, NEAR_TOUCH) & ~near.contains(robot, rows)).argmax()]
+    solids = drawn_scene(scene.solids if scene else (), robot)
     panel = own | {
         "programs": own["programs"] and not (first_caveat and first_caveat.status == "fail"),
-        "scene": drawn_scene(scene.solids if scene else (), robot),
+        "scene": solids,
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "floor": floor_of(scene),
         "clearance": clearance_data(robot, scene),
         "home": opened.tolist(),
         "target": ((robot.base + frames(robot, opened)[-1]) / 2)[:3, 3].tolist(),  # where the picture's eye looks, m
         "length": 0.68 * drawn_size(robot),
+        "turned": best_turn(robot, at_rest(robot, "", q=opened), 0.0, {"scene": solids, "size": own["size"]}),
         "head": [*map(ascii_text, program_head(None) if head is None else head)],
     }
     render(
@@ -304,7 +307,7 @@ def write_panel(
         condition=condition,
         panel=panel,
         drawing_head=drawing_head([*SPACE, *sorted(_HERE.glob("*.js"))]),
-        still=scene_still(panel, [poses_at(robot, opened)], {}).markup(),
+        still=scene_still(panel, [poses_at(robot, opened)], {}, panel["turned"]).markup(),
         command=command,
         provenance=provenance,
     )

@@ -10,9 +10,10 @@ export class ArmView extends Space {
     const { table, size } = data;
     super(canvas, data.target, data.length, () => draw());
     const names = table.coupling ? table.a.map((_, k) => String(k + 1)) : data.joint_names;
-    Object.assign(this, { data, table, links, reach: size, rows: names, base: column(table.base, 3) });
+    Object.assign(this, { data, table, links, reach: size, rows: names, base: column(table.base, 3), turn0: data.turned });
     this.surroundings = this.add(data.scene ?? []);
     [this.arm, this.other] = [data.carried ?? [], []].map((carried) => new Arm(this, data, carried));
+    if (!location.search.includes("eye=")) this.look("overview");
   }
 
   /**

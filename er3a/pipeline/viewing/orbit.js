@@ -33,6 +33,7 @@ export class Orbit {
 
   look(name) {
     Object.assign(this, VIEWS[name]);
+    if (name === "overview") this.azimuth += this.turn0 ?? 0; // from where nothing hides the arm
     this.draw();
   }
 

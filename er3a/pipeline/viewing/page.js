@@ -749,11 +749,14 @@ const entryOf = (hash) => hash?.slice(1).replace(/^(cell|entry)-/, "") || null;
 const entryLinks = document.querySelectorAll(".runs a[href^='#cell-'], .grid .entries a");
 const evidence = Object.assign(document.createElement("p"), { className: "evidence", role: "status" });
 if (entryLinks.length) document.querySelector(".side > :last-child").append(evidence);
+const next = document.querySelector(".hero:has(.look) .fix"), first = next && [next.querySelector("span").lastChild.data, next.querySelector("a").hash];
 function showEntry(entry = entryOf(location.hash)) {
-  const cells = [...(document.getElementById(`entry-${entry}`)?.cells ?? [])].filter((cell) => textOf(cell) !== "–");
+  for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
+  const look = document.querySelector(".look.shown"); // of a joint that is to be jogged: the one thing to do says it
+  const cells = [...(document.getElementById(`entry-${entry}`)?.cells ?? [])].filter((cell) => textOf(cell) !== "–").slice(0, look ? -1 : undefined);
   evidence.textContent = cells.map((cell, k) => (k < 3 ? "" : `${cell.dataset.column}${WORDS.colon}`) + textOf(cell)).join(" · ");
   for (const link of document.querySelectorAll(".grid .key > a")) link.hash = document.getElementById(`entry-${entry}`)?.id ?? "marks";
-  for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
+  if (next) [next.querySelector("span").lastChild.data, next.querySelector("a").hash] = look ? [` ${look.dataset.next}`, `#cell-${entry}`] : first;
   for (const link of entryLinks) link.toggleAttribute("data-shown", [entryOf(link.hash), link.dataset.asked].includes(entry));
 }
 for (const link of entryLinks) {

@@ -12,7 +12,7 @@ const LAMP = [0.9, -1.3, 2.4];
 const SHADOWS = 1024; // side of the map of shadows, px
 const MAX_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
 const GRID_STEPS = 8; // lines of the floor on each side of the base
-const PALE = 0.36;
+const [PALE, VEIL] = [0.36, 0.7];
 const SMALL = 0.12; // radius of a body that its name would hide, in parts of what is seen
 const HIDDEN = 0.22; // of a line, where a body is before it
 const CREASE = 0.7; // rad between two faces: less is drawn as one that is curved
@@ -106,15 +106,15 @@ export class Space extends Orbit {
   material(css, pale = false, marked = false) {
     const key = `${css} ${pale} ${marked}`;
     if (!this.materials.has(key)) {
-      const through = pale ? { transparent: true, opacity: pale === true ? PALE : pale, depthWrite: false } : {};
+      const through = pale ? { transparent: true, opacity: pale === true ? PALE : pale, depthWrite: marked } : {};
       const nearer = { polygonOffset: marked, polygonOffsetFactor: -1, polygonOffsetUnits: -4 };
       this.materials.set(key, new three.MeshStandardMaterial({ color: colourNamed(css), roughness: 0.55, ...nearer, ...through }));
     }
     return this.materials.get(key);
   }
 
-  /** A square floor at height `z` around a point, which shadows fall on. */
-  floor(centre, step, z) {
+  /** A square floor at height `z` around a point, which shadows fall on; `veiled`: what is below is seen to be. */
+  floor(centre, step, z, veiled = false) {
     const half = GRID_STEPS * step;
     const ends = Array.from({ length: 2 * GRID_STEPS + 1 }, (_, i) => (i - GRID_STEPS) * step).flatMap((at) => [
       [at, -half], [at, half], [-half, at], [half, at],
@@ -125,6 +125,11 @@ export class Space extends Orbit {
     this.ground.position.set(centre[0], centre[1], z);
     this.ground.receiveShadow = true;
     this.scene.add(this.ground);
+    if (!veiled) return;
+    const veil = Object.assign(new three.Mesh(this.ground.geometry, this.material(this.page.grid, VEIL)), { renderOrder: 1 });
+    veil.position.copy(this.ground.position);
+    veil.scale.setScalar(1.5);
+    this.scene.add(veil);
   }
 
   /** Starts a picture: lines and words of the one before are gone. */
@@ -202,6 +207,8 @@ export class Space extends Orbit {
     for (const share of ring ? [2.4, 4] : []) this.#svg("circle", { cx, cy, r: share * radius, fill: "none", stroke: css, "stroke-width": 4 / share });
   }
 
+  get small() { return this.width <= NARROW * this.letters; }
+
   /** Keeps words off what is within `radius` (m) of points in space. */
   keepClear(points, radius) {
     for (const [x, y, depth] of points.map((point) => this.seen(point))) {
@@ -225,7 +232,7 @@ export class Space extends Orbit {
     const apart = (others) => ([u, v]) => seen([u, v]) && others.every(([a, b, w, h]) => Math.abs(u - a) > (width + w) / 2 || Math.abs(v - b) > (height + h) / 2);
     const gap = ([u, v]) => Math.hypot(Math.max(0, Math.abs(u - x) - width / 2), Math.max(0, Math.abs(v - y) - height / 2));
     const clear = places.find(apart(this.taken)); // or else, in a small picture, on a body beside the word's point rather than far from it
-    const free = !needed || this.width > NARROW * this.letters || (clear && gap(clear) < 2 * height) ? clear : (places.filter((place) => gap(place) > height).find(apart(this.taken.filter(([, , , , said]) => said))) ?? clear);
+    const free = !needed || !this.small || (clear && gap(clear) < 2 * height) ? clear : (places.filter((place) => gap(place) > height).find(apart(this.taken.filter(([, , , , said]) => said))) ?? clear);
     if (!free && !needed) return;
     const [u, v] = free ?? [x, y];
     this.taken.push([u, v, width, height, text]);

@@ -78,7 +78,8 @@ class Still:
             T = poses[min(shape["frame"], len(poses) - 1)] @ np.array(shape["T"])
             points, faces = triangles_of(shape)
             colour = colours.get(shape["name"], shape["colour"])
-            self.surface(points @ T[:3, :3].T + T[:3, 3], faces, colour, PALE if "pale" in shape else 1.0)
+            alpha = shape.get("pale", 1.0)
+            self.surface(points @ T[:3, :3].T + T[:3, 3], faces, colour, PALE if alpha is True else alpha)
 
     def surface(self, points: Reals, faces: Integers, colour: str, alpha: float = 1.0) -> None:
         """A surface of triangles (M, 3) between points (N, 3), and its shadow unless it lets light through."""

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from er3a.collision.along import bodies_of
+from er3a.collision.along import bodies_of, clearance_along
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
 from er3a.finding import fact, is_one
+from er3a.geometry.transforms import inverted
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
@@ -19,10 +20,13 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.covered import Covered, assumed_rates, covered_collisions
 from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.programs import model
-from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular
+from er3a.pipeline.stages.trajectory.judgement import safe_stop
+from er3a.pipeline.stages.trajectory.motion import MotionTask, limits_of, margin_of, near_singular, task_of
 from er3a.pipeline.study import Study
-from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
+from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
+from er3a.program_check.motion_checks import curve_of
 from er3a.program_check.program_check_findings import Level
+from er3a.program_check.step_checks import Obstacles
 from er3a.programs.instructions import Pause
 from er3a.programs.languages import read_program
 from er3a.programs.program_names import ProgramOutcome
@@ -55,6 +59,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     scene = study.scene(name, "trajectory")
     limits = limits_of(robot, study.section(TrajectorySettings))
     options = replace(_options(study, name, listed), scene=scene, joint_limits=limits)
+    task = task_of(study, name)
     summaries: list[model.ProgramSummary] = []
     lines: list[model.Lines] = []
     instructions: list[model.Instructions] = []
@@ -64,6 +69,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     motions: list[model.ProgramMotion] = []
     for entry in listed.programs:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
+        check = replace(check, findings=tuple(_ended(check, each, task, options) for each in check.findings))
         motion, starts = _motion(entry.name, check, robot)
         summaries.append(_summary(entry, check, starts))
         if any(is_one(each.finding, "way_not_known") for each in check.findings):
@@ -126,6 +132,26 @@ def _options(study: Study, name: str, listed: ProgramsFile) -> CheckOptions:
         penetration_tolerance=paths.penetration_tolerance_mm / 1000,
         assumed_margin=study.assumed_margin(name),
     )
+
+
+def _ended(check: ProgramCheck, found: LocatedFinding, task: MotionTask, options: CheckOptions) -> LocatedFinding:
+    """What was found; of a collision towards which one line goes once also where and when (s of its motion) the line
+    may end: the tool point in the line's base, mm, and how clear the arm is up to there."""
+    motions = [motion for number, motion in check.motions.items() if check.execution.steps[number].place == found.place]
+    motion = motions[0] if len(motions) == 1 else None
+    if not is_one(found.finding, "motion_collides") or motion is None or motion.path is None or motion.base is None:
+        return found
+    bodies = Obstacles(task.robot, options.scene, check.motions, task.tolerance, options.assumed_margin).bodies
+    task, curve = replace(task, bodies=bodies), curve_of(motion.path)
+    times = curve.times
+    along = clearance_along(bodies, curve.joints, curve.rate_bounds, times, times[[0, -1]], task.tolerance)
+    others = [at for each, at in motion.findings.items() if at is not None and not is_one(each, "motion_collides")]
+    last = safe_stop(task, curve, times, along.contacts, others, margin_of(task, options.assumed_margin))
+    if last is None:
+        return found
+    pose = inverted(motion.base) @ forward(motion.arm, curve.joints(np.array([last.kept_to])))[0]
+    end = tuple((1000 * pose[:3, 3]).tolist())
+    return replace(found, finding=found.finding.but(end_mm=end, end_s=last.kept_to, margin_mm=1000 * last.margin))
 
 
 def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, float]) -> model.ProgramSummary:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.collision.along import ClearanceAlong, clearance_along
-from er3a.collision.shapes import arm_shapes, shapes_assumed
+from er3a.collision.shapes import shapes_assumed
 from er3a.finding import Finding, fact
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -26,11 +26,13 @@ from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_exp
 from er3a.pipeline.stages.programs.model import finding_at
 from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import (
+    ROUNDED,
     ListedMotion,
     Motion,
     MotionTask,
     corner_misses,
     listed_motions,
+    margin_of,
     task_of,
 )
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes, program_files
@@ -45,7 +47,6 @@ from er3a.robots.joint_limits import shown, speeds_given, within
 from er3a.robots.robot import Robot
 
 MIN_RATIO = 1e-3  # of the limits, below which a path counts as standing still
-ROUNDED = 0.0005  # m, by which a pose may be off that is written with one decimal of mm and two of deg
 ROWS = 250  # of each motion in the table
 CLEARANCE_TIMES = 41
 
@@ -424,8 +425,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     plain, assumed_margin = task_of(study, name), study.assumed_margin(name)
     only = None if settings.avoidance == "compare" else settings.avoidance
-    margin = (assumed_margin if arm_shapes(robot).assumed else plain.tolerance) + ROUNDED
-    task = AvoidanceTask(**vars(plain), only=only, margin=margin)
+    task = AvoidanceTask(**vars(plain), only=only, margin=margin_of(plain, assumed_margin))
     listed = list(listed_motions(study.entry(name).paths, task, settings.checks_per_sample))
     judged = [_judged(task, each, each.motion, settings, assumed_margin) for each in listed if each.motion]
     checks = model.PathChecks.stacked([each.checks for each in judged]).of_joints(robot.slides)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-from er3a.collision.along import ClearanceAlong, clearance_along
+from er3a.collision.along import ClearanceAlong, Contact, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import label_of
 from er3a.collision.shapes import surely_touch
@@ -19,6 +19,7 @@ from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.motion import Motion, MotionTask
 from er3a.planning import motion_faults
 from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict, gravest, in_order
+from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.tool_curve import open_stretches
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -201,16 +202,39 @@ def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair, along.measured)
 
 
-def last_safe_stop(task: MotionTask, motion: Motion, found: Judgement, margin: float) -> model.ClearUntil | None:
-    """The last point from which a motion still stops with a margin (m) kept; None if it meets nothing, or keeps it
-    nowhere.
+@dataclass(frozen=True)
+class SafeStop:
+    """Up to where a motion keeps a margin.
 
-    The end of the margin is searched for on a grid up to the first contact, or to where the motion leaves limits or
-    reach, and proven: where the clearance along the motion up to it is less, it is moved back. Of links that touch by
-    design at their joint, which may have no margin to keep there, those that overlap elsewhere and begin within it keep
-    half of their first distance.
+    Attributes
+    ----------
+    margin : m; of links that touch by design at their joint half of their first distance, where that is less
+    kept_to : s, proven
+    begin, stop : when (s) the last stop along the motion begins that ends by then, and how long it takes
     """
-    contacts, bodies, acceleration = found.along.contacts, task.bodies, task.limits.acceleration
+
+    margin: float
+    kept_to: float
+    begin: float
+    stop: float
+
+
+def safe_stop(
+    task: MotionTask,
+    motion: Motion | PiecewiseMotion,
+    known: Reals,
+    contacts: Sequence[Contact],
+    stops: Sequence[float],
+    margin: float,
+) -> SafeStop | None:
+    """The last stop of a motion with a margin (m) kept; None if it meets nothing, or keeps it nowhere.
+
+    The end of the margin is searched for on a grid up to the first contact, or to one of ``stops`` (s), where the
+    motion leaves limits or reach, and proven: where the clearance along the motion up to it is less, it is moved back.
+    Of links that touch by design at their joint, which may have no margin to keep there, those that overlap elsewhere
+    and begin within it keep half of their first distance. ``known`` (N,), s, rising: times from which it is measured.
+    """
+    bodies, acceleration = task.bodies, task.limits.acceleration
     if not contacts:
         return None
     first, met = contacts[0].start, {pair for contact in contacts for pair in contact.pairs}
@@ -228,25 +252,33 @@ def last_safe_stop(task: MotionTask, motion: Motion, found: Judgement, margin: f
         spare = bodies.min_distance(motion.joints(t))[0] - margin
         return np.minimum(spare, (apart(t) - kept).min(axis=1)) if joined.size else spare
 
-    stops = [part.start for part in found.limits] + [part.start for part in found.beyond]
     last = min([first, *(BEFORE_STOP * stop for stop in stops)])
-    kept_to = _margin_end(task, motion, beyond, last, margin)
+    kept_to = _margin_end(task, motion, known, beyond, last, margin)
     if kept_to is None:
         return None
-    end = kept_to
-    stop = float(_stop_time(motion, np.array([end]), acceleration)[0])
-    if end < last:
-        begun = _stop_before(motion, end, acceleration)
-        if begun is None:
+    begun = kept_to, float(_stop_time(motion, np.array([kept_to]), acceleration)[0])
+    if kept_to < last:
+        found = _stop_before(motion, kept_to, acceleration)
+        if found is None:
             return None
-        end, stop = begun
-    pose, q = motion.tool(np.array([end]))[0], motion.joints(np.array([end, first]))
-    touching = bodies.surface_points(q[1], int(bodies.min_distance(q[1:])[1][0])).mean(axis=0)
+        begun = found
+    return SafeStop(float(min([margin, *kept])), kept_to, *begun)
+
+
+def last_safe_stop(task: MotionTask, motion: Motion, found: Judgement, margin: float) -> model.ClearUntil | None:
+    """The last point from which a path still stops with a margin (m) kept, as of :func:`safe_stop`."""
+    stops = [part.start for part in (*found.limits, *found.beyond)]
+    last = safe_stop(task, motion, motion.t, found.along.contacts, stops, margin)
+    if last is None:
+        return None
+    end = np.array([last.begin])
+    pose, q = motion.tool(end)[0], motion.joints(np.append(end, found.along.contacts[0].start))
+    touching = task.bodies.surface_points(q[1], int(task.bodies.min_distance(q[1:])[1][0])).mean(axis=0)
     return model.ClearUntil(
-        1000 * float(min([margin, *kept])),
-        end,
-        stop,
-        float(motion.way(np.array([end]))[0]),
+        1000 * last.margin,
+        last.begin,
+        last.stop,
+        float(motion.way(end)[0]),
         tuple((1000 * pose[:3, 3]).tolist()),
         tuple(np.degrees(rpy_of(pose)).tolist()),
         tuple(shown(task.robot, q[0]).tolist()),
@@ -255,7 +287,12 @@ def last_safe_stop(task: MotionTask, motion: Motion, found: Judgement, margin: f
 
 
 def _margin_end(
-    task: MotionTask, motion: Motion, beyond: Callable[[Reals], Reals], last: float, margin: float
+    task: MotionTask,
+    motion: Motion | PiecewiseMotion,
+    known: Reals,
+    beyond: Callable[[Reals], Reals],
+    last: float,
+    margin: float,
 ) -> float | None:
     """Up to when (s, ``last`` at most) a motion keeps a margin (m), proven; None if nowhere.
 
@@ -270,8 +307,8 @@ def _margin_end(
         k = int(np.argmax(spare <= 0))
         if k > 0:
             end = scipy.optimize.brentq(lambda t: beyond(np.array([t]))[0], grid[k - 1], grid[k], xtol=1e-9 * last)
-        known = np.append(motion.t[motion.t < end], end)
-        until = clearance_along(task.bodies, motion.joints, motion.rate_bounds, known, known[[0, -1]], task.tolerance)
+        times = np.append(known[known < end], end)
+        until = clearance_along(task.bodies, motion.joints, motion.rate_bounds, times, times[[0, -1]], task.tolerance)
         short = until.distance < margin - task.tolerance
         if not short.any():
             return float(end)
@@ -279,7 +316,7 @@ def _margin_end(
     return None
 
 
-def _stop_before(motion: Motion, end: float, acceleration: Reals) -> tuple[float, float] | None:
+def _stop_before(motion: Motion | PiecewiseMotion, end: float, acceleration: Reals) -> tuple[float, float] | None:
     """The last time (s) at which a stop along a motion can begin that ends by a time, and how long it takes; None if
     none can. What keeps the accelerations comes, in the time that a stop takes, at least as far as the stop does."""
     times = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
@@ -288,7 +325,7 @@ def _stop_before(motion: Motion, end: float, acceleration: Reals) -> tuple[float
     return (float(times[kept[-1]]), float(stops[kept[-1]])) if len(kept) else None
 
 
-def _stop_time(motion: Motion, t: Reals, acceleration: Reals) -> Reals:
+def _stop_time(motion: Motion | PiecewiseMotion, t: Reals, acceleration: Reals) -> Reals:
     """How long (s) the joints take to stop at times (k,)."""
     found: Reals = (np.abs(motion.rates(t)[1]) / acceleration).max(axis=1)
     return found

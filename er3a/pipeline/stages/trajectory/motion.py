@@ -12,6 +12,7 @@ import scipy
 
 from er3a.collision.along import RateBounds
 from er3a.collision.bodies import Bodies
+from er3a.collision.shapes import arm_shapes
 from er3a.errors import InputError, NotWristPartitionedError, PoseError
 from er3a.files.path_file import PathEntry, ProgramPath, load_paths
 from er3a.files.units import joint_values
@@ -114,6 +115,7 @@ def planned_entries(task: MotionTask, entry: PathEntry | ProgramPath, source: Co
         yield PartOfProgram(name, title, entry.samples, entry.expected, part, rest, Path(entry.program))
 
 
+ROUNDED = 0.0005  # m, by which a pose may be off that is written with one decimal of mm and two of deg
 FOLLOWED_AT = 1030  # times at which a path of the tool is solved at least: its branches depend on no samples
 EQUAL_TIMES = 1e-12  # share of the duration
 MISSED = 1.0  # mm, from which a corner that passes beside its point is said to miss it
@@ -396,6 +398,11 @@ def task_of(study: Study, name: str) -> MotionTask:
     robot = study.robot(name)
     bodies = Bodies(robot, study.scene(name, "trajectory"))
     return planning_of(robot, study.section(TrajectorySettings), bodies, study.seed)
+
+
+def margin_of(task: MotionTask, assumed_margin: float) -> float:
+    """The margin (m) at which a motion that meets something may end; ``assumed_margin``: m, around assumed shapes."""
+    return (assumed_margin if arm_shapes(task.robot).assumed else task.tolerance) + ROUNDED
 
 
 def assumed_speeds(robot: Robot, settings: TrajectorySettings) -> Reals:

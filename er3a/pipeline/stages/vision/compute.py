@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
 from er3a.files.vision_file import ObjectEntry, VisionFile, load_vision
 from er3a.files.yaml_file import load
 from er3a.finding import Finding, fact
-from er3a.geometry.transforms import inverted, quaternion_of, rpy_of
+from er3a.geometry.transforms import inverted, quaternion_of, rpy_of, translation
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
@@ -38,7 +39,14 @@ from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.field_of_view import in_sight
 from er3a.vision.grasp_motion import PARTS
-from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
+from er3a.vision.grasping import (
+    ChosenGrasp,
+    DetectedObject,
+    GraspNeeds,
+    GraspPlan,
+    GraspTask,
+    plan_grasp,
+)
 from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
 from er3a.vision.point_error import SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
@@ -158,6 +166,7 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
 
 STAGE_NAME = "vision"
 LEG_ROWS = 13
+DIRECTIONS, MOST_FOLLOWED = 24, 20  # around an object, and places that take as long as an object does
 
 
 def compute(study: Study, name: str) -> model.VisionResults:
@@ -202,7 +211,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     calibration = calibration_result(head, found, images)
     doubt = _doubt(calibration, found.touch)
     planned = [] if doubt else list(_planned(cell, scene, settings, limits_of(robot, motions), study.seed))
-    objects = tuple(_object(robot, entry, cell.place(entry), plan) for entry, plan in planned)
+    objects = tuple(_object(robot, entry, cell.place(entry), plan, moved) for entry, plan, moved in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
     open_points = (
@@ -373,12 +382,14 @@ def _doubt(found: model.CalibrationResult, touch: TouchCheck | None) -> Finding 
     return touch.contradiction if touch else None
 
 
-Planned = list[tuple[ObjectEntry, GraspPlan]]
+Moved = tuple[Reals, ChosenGrasp] | None
+Planned = list[tuple[ObjectEntry, GraspPlan, Moved]]
 
 
 def _planned(
     cell: _Cell, scene: Scene | None, settings: VisionSettings, limits: JointLimits, seed: int
-) -> Iterator[tuple[ObjectEntry, GraspPlan]]:
+) -> Iterator[tuple[ObjectEntry, GraspPlan, Moved]]:
+    """Of each object its grasp, or where it could be grasped."""
     gripper = cell.file.gripper
     tolerance = (*(mm / 1000 for mm in gripper.tolerance_mm), *np.radians(gripper.tolerance_deg))
     needs = GraspNeeds(
@@ -392,10 +403,29 @@ def _planned(
     task = GraspTask(cell.robot, Bodies(cell.robot, scene), cell.home, needs, limits, speed, seed)
     for entry in cell.file.objects:
         target = entry.detected()
-        yield entry, plan_grasp(task, target, cell.place(entry), partial(cell.error_at, target))
+        plan = plan_grasp(task, target, cell.place(entry), partial(cell.error_at, target))
+        yield entry, plan, None if plan.chosen else _moved(cell, scene, task, entry)
 
 
-def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan) -> model.ObjectResult:
+def _moved(cell: _Cell, scene: Scene | None, task: GraspTask, entry: ObjectEntry) -> Moved:
+    """The nearest place in the camera's view at an object's height where it can be grasped, its pose (4, 4), m, and the
+    grasp; None where the first ``MOST_FOLLOWED`` places that have a candidate fail later."""
+    place, view, followed = cell.place(entry), cell.file.view.view(), 0
+    for far, turn in product(1e-3 * np.array(model.CIRCLES_MM), np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)):
+        T = translation(far * np.cos(turn), far * np.sin(turn), 0) @ place
+        there = replace(entry.detected(), T_camera_object=entry.pose() @ inverted(place) @ T)
+        if not in_sight(view, there.T_camera_object[None, :3, 3])[0] or gaps_in_solids(scene, [("", T[:3, 3], 0.0)]):
+            continue
+        plan = plan_grasp(task, there, T, partial(cell.error_at, there))
+        if plan.chosen:
+            return T, plan.chosen
+        followed += plan.followed > 0
+        if followed == MOST_FOLLOWED:
+            break
+    return None
+
+
+def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan, moved: Moved) -> model.ObjectResult:
     error_mm = error_deg = None
     if (error := plan.error) is not None:
         causes = error.camera, error.calibration, error.repeatability, error.table, error.whole
@@ -413,6 +443,8 @@ def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan) -> mode
         error_mm=error_mm,
         error_deg=error_deg,
         grasp=_grasp(robot, plan.chosen) if plan.chosen else None,
+        moved_to_mm=tuple((1000 * moved[0][:3, 3]).tolist()) if moved else None,
+        moved_q_deg=tuple(shown(robot, moved[1].q).tolist()) if moved else None,
     )
 
 
@@ -506,7 +538,7 @@ def figures_of(
 
 def _all_ways(robot: Robot, planned: Planned) -> model.PathRows:
     """The motions of all grasps."""
-    found = (_ways(robot, entry.name, plan.chosen) for entry, plan in planned if plan.chosen)
+    found = (_ways(robot, entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen)
     return model.PathRows.stacked(found).of_joints(robot.slides)
 
 

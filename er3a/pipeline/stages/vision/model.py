@@ -134,6 +134,9 @@ class GraspResult:
     duration_s: float
 
 
+CIRCLES_MM = range(10, 610, 10)  # around an object, on which places are tried for it
+
+
 @dataclass(frozen=True)
 class ObjectResult:
     """A detected object, where it is in the base's frame, and what comes of it.
@@ -142,6 +145,9 @@ class ObjectResult:
     ----------
     error_mm, error_deg : None where nothing is grasped
     poses, solutions, followed : grasps in all turns, their joint solutions, and those followed along both lines
+    moved_to_mm : of one that is not grasped, the nearest place at the same height at which it could be; None where
+        none was found
+    moved_q_deg : of the arm, in mm for a prismatic joint, as it grasps it there
     """
 
     name: str
@@ -158,6 +164,8 @@ class ObjectResult:
     poses: int
     solutions: int
     followed: int
+    moved_to_mm: Three | None = None
+    moved_q_deg: tuple[float, ...] | None = None
 
 
 class VisionSummary(Summary):

@@ -58,7 +58,7 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
                 events += _found_event(program, each, rows)
         if len(rows):
             motions.append(
-                PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events, _missed(program, rows))
+                PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events, _marks(program, rows))
             )
         else:  # nothing of it was carried out: the arm rests
             said = joined([in_few_words(say(each.finding)) for each in program.findings])
@@ -78,10 +78,21 @@ def _safe_s(program: ProgramSummary) -> float:
     return min(wrong, default=0.0) - SHORTLY
 
 
-def _missed(program: ProgramSummary, rows: ProgramMotion) -> list[Mark]:
-    """The ways from where lines end, because they leave what the arm reaches, to their targets."""
+def _end_s(found: FindingAt) -> float | None:
+    """When (s) a line is where it may end, by the player; None where nothing says so, or nothing shows it."""
+    if found.program_s is None or "end_s" not in found.finding.params:
+        return None
+    return found.program_s - (found.motion_s or 0.0) + float(found.finding.end_s)
+
+
+def _marks(program: ProgramSummary, rows: ProgramMotion) -> list[Mark]:
+    """Where lines that meet something may end; of those that leave what the arm reaches the way to their target."""
     marks = []
     for found in program.findings:
+        if (end := _end_s(found)) is not None:
+            said = tr("safe end: {far} mm clear", far=fixed(found.finding.margin_mm, 1))
+            x, y, z = (float(np.interp(end, rows.t_s, own)) / 1000 for own in rows.xyz_mm.T)
+            marks.append(Mark(end - MOMENT, float(rows.t_s[-1]), (x, y, z), (x, y, z), said))
         if place := found.finding.params.get("target_m"):
             tip = rows.xyz_mm[np.searchsorted(rows.t_s, (found.program_s or 0.0) - MOMENT)] / 1000
             marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(place), tr("not reachable")))
@@ -176,7 +187,8 @@ def faults(results: ProgramsResults) -> list[Fault]:
         lines = stretches(results.motion.take(results.motion.program == program.name))
         shown = [worst] if worst.level == first.level else [worst, first]
         moments = tuple(_moment(program, each, lines) for each in shown)
-        safe = _safe_s(program)
+        end = _end_s(worst)
+        safe = _safe_s(program) if end is None else end
         collides = is_one(worst.finding, "motion_collides")
         found.append(
             Fault(

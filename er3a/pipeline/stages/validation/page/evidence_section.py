@@ -9,6 +9,7 @@ from typing import Any
 
 from er3a.confirmation.plan import plan
 from er3a.errors import Er3aError
+from er3a.finding import Finding, is_one
 from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Status
 from er3a.pipeline.language import N_, tr, with_unit
@@ -20,7 +21,6 @@ from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.pipeline.viewing.answer import ListRow
 from er3a.pipeline.viewing.page import panel_link
 from er3a.references.quantities import MM
-from er3a.references.seen import TOWARD
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -77,8 +77,8 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
     left.sort(key=lambda each: (not each.off.moves, _unbounded(each), -each.off.mm, -each.off.deg))
-    proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
-    present = {each.status for each in numbers}
+    proposals = {proposal.entry: to_settle(proposal) for proposal in evidence.proposals}
+    present = {status_of(each) for each in numbers}
     first = [ListRow("fail", entry_word(each.entry), _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
@@ -93,9 +93,16 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
             [*_row(each, evidence), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left
         ],
         settled_rows=[_row(each, evidence) for each in numbers if each.status in SETTLED],
-        looks=[each for each in evidence.proposals if each.params.get("seen") in TOWARD],
+        looks=[each for each in evidence.proposals if is_one(each, "look_at_motion")],
         first=first if evidence.contradicted else to_confirm(evidence),
     )
+
+
+def to_settle(proposal: Finding) -> str:
+    """What would settle an entry: of lengths and angles the poses of :func:`to_confirm`, whose second step they are."""
+    if not is_one(proposal, "measure_angle", "measure_length"):
+        return say(proposal)
+    return tr("Read five poses, for {names}", names=entry_word(proposal.entry))
 
 
 def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
@@ -215,11 +222,17 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any]
     return dict(
         entry=each.entry,
         value=_plain(each.value),
-        status=each.status,
-        mark=MARKS[each.status],
-        title=tr("{entry}: {status}", entry=each.entry, status=_status(each.status)),
+        status=status_of(each),
+        mark=MARKS[status_of(each)],
+        title=tr("{entry}: {status}", entry=entry_word(each.entry), status=_status(status_of(each))),
         gives=_other_given(each, evidence),
+        single=len(each.by) == 1,
     )
+
+
+def status_of(each: EntryEvidence) -> Status:
+    """What is known of an entry; a direction is a sign, and so settled as a whole."""
+    return "settled" if each.status == "settled_up_to_signs" and column_of(each.entry) == "direction" else each.status
 
 
 def _marked(status: Status) -> str:
@@ -239,7 +252,7 @@ def _row(each: EntryEvidence, evidence: TableEvidence) -> list[str]:
     return [
         entry_word(each.entry),
         with_unit(_plain(each.value or 0.0), each.unit),
-        _marked(each.status),
+        _marked(status_of(each)),
         _interval(each, evidence),
         joined(each.by, ", ") or "–",
     ]

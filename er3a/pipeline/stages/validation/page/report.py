@@ -33,6 +33,8 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     other_robot,
     plain_table,
     poses_to_read,
+    status_of,
+    to_settle,
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix
@@ -66,6 +68,7 @@ TILT = 0.35  # of a circle around an axis in the drawing's plane, seen a little 
 RADIUS = 0.045  # of such an arrow, of the size of the arm
 BELOW = 0.15  # of a reach: from one line to the next below the base
 LABELLED = 5  # of the lengths that are wrong, at most, so that words have room
+UP, MARK_MM = [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)], 1000.0  # where a mark on the flange is that is seen to turn
 JOG = np.radians(np.linspace(0.0, 30.0, 13))  # of a joint that one looks at
 VIEWS = {  # from x, y and z to what is to the right and upwards for one who looks from there
     N_("from above, base toward you"): [(0, 1), (-1, 0), (0, 0)],
@@ -206,10 +209,17 @@ def _both_arms(
 
 def _look(robot: Robot, found: Finding) -> Markup:
     """Where the arm goes when a joint is jogged, and where it would if its direction were the other, seen from where
-    the flange is farthest off."""
+    the flange is farthest off; where the flange turns in its place, where a mark on it goes."""
     q, jog = meant(robot, found.pose_deg), np.eye(robot.joints)[found.joint - 1]
     ways = np.array([[1000 * skeleton(robot, q + turn * jog) for turn in way] for way in (JOG, -JOG)])
-    side = max(VIEWS, key=lambda each: np.linalg.norm(np.diff(ways[:, -1, -1] @ VIEWS[each], axis=0)))
+    manner, _, toward = found.seen.rpartition("_")
+    if manner:
+        flanges = np.array([[frames(robot, q + turn * jog)[-1, :3, :3] for turn in way] for way in (JOG, -JOG)])
+        across = UP[1] if manner == "clockwise" and toward in ("up", "down") else UP[0]
+        mark = flanges[0, 0, :, 2] if manner == "tilts" else np.array(across)
+        tips = flanges @ flanges[0, 0].T @ mark
+        ways = np.stack([np.zeros_like(tips), MARK_MM * tips], axis=2)
+    side = max(VIEWS, key=lambda each: np.linalg.norm((ways[0, -1, -1] - ways[0, 0, -1]) @ VIEWS[each]))
     right, wrong = ways @ VIEWS[side]
     arms = [
         SeenArm(tr("{entry} is right", entry=entry_word(found.entry)), "", "right", right[-1]),
@@ -218,8 +228,8 @@ def _look(robot: Robot, found: Finding) -> Markup:
     size = 2 * RADIUS * float(np.ptp(right[-1], axis=0).max())
     over = [DrawnLine(_headed(way[:, -1], size), look) for way, look in ((right, "turn right"), (wrong, "turn wrong"))]
     title = tr("+J{joint}, {side}", joint=found.joint, side=tr(side))
-    return Markup('<div class="look" data-entry="{}"><b>{}</b>{}</div>').format(
-        found.entry, title, side_view(arms, ratio=1.0, over=over)
+    return Markup('<div class="look" data-entry="{}" data-next="{}"><b>{}</b>{}</div>').format(
+        found.entry, say(found), title, side_view(arms, ratio=1.0, over=over)
     )
 
 
@@ -261,7 +271,7 @@ def _answer(
     if evidence and bad:
         keys.append((f"{bad}/{known_alone(evidence)}", tr("entries contradicted")))
     elif evidence and unsure:
-        settled = sum(each.status == "settled" for each in evidence.entries)
+        settled = sum(status_of(each) == "settled" for each in evidence.entries)
         signs = known_alone(evidence) - unsure - settled
         below = tr(
             "{settled} settled, {signs} but for signs, {left} to confirm.", settled=settled, signs=signs, left=unsure
@@ -284,7 +294,7 @@ def _answer(
             instead=False,
         )
     elif is_one(found, "validation.left_open") and found.next_measurement:
-        fix = Fix(say(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
+        fix = Fix(to_settle(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
         fix = Fix(tr("read five poses at the pendant: er3a confirm {robot} --plan", robot=robot), instead=False)
     return Answer(headline, rest, below, keys, (), fix)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -13,11 +12,11 @@ from er3a.files.vision_file import VisionFile
 from er3a.finding import is_one
 from er3a.geometry.transforms import inverted, posed
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, tr
+from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
-from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, VisionResults, VisionSummary
+from er3a.pipeline.stages.vision.model import CIRCLES_MM, ObjectResult, PoseEstimate, VisionResults, VisionSummary
 from er3a.pipeline.viewing.drawn import Shape
 from er3a.pipeline.viewing.palette import REFERENCE, VERDICTS
 from er3a.robots.joint_limits import meant
@@ -26,21 +25,44 @@ from er3a.robots.robot import Robot
 WAYS = {"move": N_("move to the approach"), "approach": N_("straight to the grasp"), "retreat": N_("retreat")}
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
 ROUND_M = {"radius": 0.02, "length": 0.06}
-SIGHT = 0.2  # of the farthest distance, how far the drawn pyramid reaches: a longer one would outweigh the arm
+SIGHT = 0.2  # of the farthest distance, how far the pyramid of a camera reaches that moves with the arm
+PALE = 0.1  # opacity of the pyramid
 CAMERA_M = (0.09, 0.07, 0.07)
-SIDES = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]  # of a pyramid, its top first
+SIDES = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1], [1, 3, 2], [1, 4, 3]]  # of a pyramid, its top first
 CONE = [*SIDES, *(side[::-1] for side in SIDES)]  # seen from both sides
 
 
 def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[PlayedMotion]:
     """The way to each object and away from it, with the arm before the approach drawn pale; the arm where it waits for
     an object that it does not grasp."""
-    home, sight = meant(robot, np.array(task.home_deg)), _sight(results.summary)
-    found = [_motion(robot, results, each, home) for each in results.summary.objects]
-    return [
-        replace(motion, marks=[*motion.marks, *(replace(ray, t1=float(motion.t[-1])) for ray in own)])
-        for motion, own in zip(found, sight)
-    ]
+    home, objects = meant(robot, np.array(task.home_deg)), results.summary.objects
+    moved = [_moved(robot, each) for each in objects if each.moved_to_mm]
+    return [*(_motion(robot, results, each, home) for each in objects), *moved]
+
+
+def moved_name(each: ObjectResult) -> str:
+    """What the player calls an object at the place at which it could be grasped."""
+    return tr("{name}, moved", name=each.name)
+
+
+def moved_text(each: ObjectResult) -> str:
+    """How far an object has to be moved to be grasped, and to where; that it can't be, if no place was found."""
+    if each.moved_to_mm is None:
+        return tr("No place found within {far} mm.", far=max(CIRCLES_MM))
+    at = ", ".join(fixed(value, 0) for value in each.moved_to_mm)
+    return tr("Move {name} by {far}, to ({at}) mm.", name=each.name, far=_far(each.xyz_mm, each.moved_to_mm), at=at)
+
+
+def _far(start: Sequence[float], end: Sequence[float]) -> str:
+    return with_unit(fixed(float(np.linalg.norm(np.subtract(start, end))), 0), "mm")
+
+
+def _moved(robot: Robot, each: ObjectResult) -> PlayedMotion:
+    """The arm as it grasps an object at the place to which it would have to be moved."""
+    assert each.moved_to_mm is not None
+    q, way = meant(robot, np.array(each.moved_q_deg)), (_metres(each.xyz_mm), _metres(each.moved_to_mm))
+    marks = [Mark(0.0, 1.0, *way, _far(each.xyz_mm, each.moved_to_mm))]
+    return at_rest(robot, moved_name(each), tr("Can be grasped here"), "plain", q, marks=marks)
 
 
 def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Reals) -> PlayedMotion:
@@ -93,8 +115,11 @@ def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[
     T = placed(found.hand_eye) if fixed_camera else inverted(robot.last_to_tool) @ placed(found.hand_eye)
     frame = 0 if fixed_camera else robot.rows + 1
     common = {"frame": frame, "name": tr("camera"), "T": T.tolist(), "colour": REFERENCE}
-    points = np.concatenate([np.zeros((1, 3)), _corners(task, SIGHT * task.view.farthest_mm / 1000)])
-    cone = {"kind": "mesh", "points": points.tolist(), "faces": CONE, "pale": True, "own": REFERENCE}
+    corners = _corners(task, SIGHT * task.view.farthest_mm / 1000)
+    if fixed_camera:
+        corners = _down(T, _corners(task, task.view.farthest_mm / 1000), summary)
+    points = np.concatenate([np.zeros((1, 3)), corners])
+    cone = {"kind": "mesh", "points": points.tolist(), "faces": CONE, "pale": PALE, "own": REFERENCE}
     return [*shapes, {**common, "kind": "box", "size": CAMERA_M}, {**common, **cone}]
 
 
@@ -104,13 +129,12 @@ def _corners(task: VisionFile, far: float) -> Reals:
     return np.array([[-x, -y, far], [x, -y, far], [x, y, far], [-x, y, far]])
 
 
-def _sight(summary: VisionSummary) -> list[list[Mark]]:
-    """Of each object the line from a fixed camera to it; none of a camera that moves."""
-    found = summary.calibration
-    if found is None or found.setup != "eye_to_hand":
-        return [[] for _ in summary.objects]
-    start = _metres(found.hand_eye.xyz_mm)
-    return [[Mark(0.0, 0.0, start, _metres(each.xyz_mm), "")] for each in summary.objects]
+def _down(T: Reals, corners: Reals, summary: VisionSummary) -> Reals:
+    """The corners (4, 3), m, of what a camera at ``T`` sees, down to the foot of its lowest object."""
+    lowest = min((each.xyz_mm[2] / 1000 for each in summary.objects), default=-np.inf) - OBJECT_M[2] / 2
+    falls = -(corners @ T[2, :3])
+    shares = np.divide(T[2, 3] - lowest, falls, out=np.ones(4), where=falls > T[2, 3] - lowest)
+    return corners * shares[:, None]
 
 
 def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:

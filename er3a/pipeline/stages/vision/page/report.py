@@ -18,10 +18,18 @@ from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.messages.vision import MENDING, pose_words
+from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
-from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
+from er3a.pipeline.stages.vision.page.played import (
+    grasp_moment,
+    motions,
+    moved_name,
+    moved_text,
+    refusal_text,
+    seen_shapes,
+)
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
 from er3a.pipeline.viewing.figures import new_figure
@@ -214,8 +222,8 @@ def _row(each: model.ObjectResult, moment: tuple[str, float], fix: Fix | None) -
     if each.grasp:
         text = tr("{percent} % succeed", percent=fixed(100 * each.grasp.probability, 1))
         return ListRow("pass", each.name, text, "#objects", moment, fix=fix)
-    instead = tr("Move {name}, or allow another grasp.", name=each.name)
-    return ListRow("fail", each.name, refusal_text(each), "#objects", moment, fix=Fix(instead))
+    there = address_of("vision", moved_name(each), 0.0, "objects") if each.moved_to_mm else ""
+    return ListRow("fail", each.name, refusal_text(each), "#objects", moment, fix=Fix(moved_text(each), there))
 
 
 def _why_left_out(found: Finding) -> str:
