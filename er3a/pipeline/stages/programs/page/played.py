@@ -92,7 +92,7 @@ def _marks(program: ProgramSummary, rows: ProgramMotion) -> list[Mark]:
         if (end := _end_s(found)) is not None:
             said = tr("safe end: {far} mm clear", far=fixed(found.finding.margin_mm, 1))
             x, y, z = (float(np.interp(end, rows.t_s, own)) / 1000 for own in rows.xyz_mm.T)
-            marks.append(Mark(end - MOMENT, float(rows.t_s[-1]), (x, y, z), (x, y, z), said))
+            marks.append(Mark(end - MOMENT, found.program_s or end, (x, y, z), (x, y, z), said))
         if place := found.finding.params.get("target_m"):
             tip = rows.xyz_mm[np.searchsorted(rows.t_s, (found.program_s or 0.0) - MOMENT)] / 1000
             marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(place), tr("not reachable")))

@@ -11,7 +11,7 @@ from er3a.confirmation.plan import plan
 from er3a.errors import Er3aError
 from er3a.finding import Finding, is_one
 from er3a.identifiability.entries import CONTINUOUS, column_of
-from er3a.identifiability.entry_evidence import EntryEvidence, Status
+from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
 from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.confirm import on_pendant
 from er3a.pipeline.messages.numbers import fixed
@@ -188,8 +188,7 @@ def _other_given(each: EntryEvidence, evidence: TableEvidence) -> str:
 
 def _alone(each: EntryEvidence) -> str:
     """Another value that an open entry may have though all others are right; empty where it has none."""
-    readings = [reading for reading in each.alternatives if reading.off.moves and not reading.excluded_by]
-    values = [dict(reading.entries) for reading in readings if each.status == "open"]
+    values = [dict(reading.entries) for reading in _others(each) if each.status == "open"]
     return next((_plain(value[each.entry]) for value in values if value.keys() == {each.entry}), "")
 
 
@@ -296,8 +295,12 @@ def _off(mm: float, deg: float) -> str:
 
 def _fits(each: EntryEvidence) -> str:
     """Other values that independent documents allow, and that make another robot."""
-    others = [reading for reading in each.alternatives if reading.off.moves and not reading.excluded_by]
     named = (
-        joined([f"{entry_word(name)} = {_plain(value)}" for name, value in reading.entries], ", ") for reading in others
+        joined([f"{entry_word(name)} = {_plain(value)}" for name, value in reading.entries], ", ")
+        for reading in _others(each)
     )
     return joined(named) or "–"
+
+
+def _others(each: EntryEvidence) -> list[OtherReading]:
+    return [reading for reading in each.alternatives if reading.off.moves and not reading.excluded_by]
