@@ -330,7 +330,7 @@ def link_shapes(
         else []
     )
     if astray:
-        notes.append(f"shapes of {', '.join(astray)} are left out: they do not move with the arm's chain")
+        notes.append(f"shapes of {urdf_tree.some(astray)} are left out: they do not move with the arm's chain")
     return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
 
 
@@ -374,7 +374,7 @@ def link_visuals(
         whole = link_mesh(number, np.concatenate(meshes))
         points, faces = simplified(whole.points, whole.faces, DRAWN_TRIANGLES // len(parts))
         found.append(link_mesh(number, points[faces]))
-    notes = [f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values()]
+    notes = [f"pictures show no visual geometry of {urdf_tree.some([*missing])}: {why}" for why in missing.values()]
     return tuple(found), tuple(notes[:1])
 
 
