@@ -308,7 +308,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
 def _notes_of(tree: Tree, joints: Sequence[UrdfJoint]) -> Iterator[str]:
     """The notes on joints, one for all joints of which the same is said, and one on those beyond the last."""
     if joints and (moving := tree.onward(link := joints[-1].child)[0]):
-        yield f"beyond the arm's last link {link} joints are kept at 0, as of a gripper: {some(_names(moving))}"
+        yield f"beyond the last link {link} joints stay at 0, as of a gripper: {some([each.name for each in moving])}"
     yield from by_note([(note, joint.name) for joint in joints for note in joint.notes])
 
 
@@ -404,7 +404,7 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
             break
         if len(active) > 1:
             ends = [end for joint in active for end in tree.ends(joint.child, count + joint.independent)]
-            problem = f"branches into moving joints {some(_names(active))}"
+            problem = f"branches into moving joints {some([each.name for each in active])}"
             raise InputError(tree.path, f"link {link}", problem, f"Name where the arm ends by --tip: {some(ends)}")
         if not active and len(moving) > 1:
             break
@@ -416,12 +416,10 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
         chain.append((active or moving or onward)[0])
         link = chain[-1].child
     if passive:
-        notes.append(f"joints beside the chain that only follow others were left out: {some(_names(passive))}")
+        notes.append(
+            f"joints beside the chain that only follow others were left out: {some([each.name for each in passive])}"
+        )
     return chain
-
-
-def _names(joints: list[UrdfJoint]) -> list[str]:
-    return [joint.name for joint in joints]
 
 
 def some(names: Sequence[str]) -> str:
