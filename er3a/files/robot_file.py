@@ -775,7 +775,7 @@ class RobotFile(InputFile):
             small = ", ".join(f"{angle:g}" for angle in angles if 0 < abs(angle) < RADIANS_BELOW_DEG)
             doubt(self, "dh.rows, zero.rows", f"{small} deg", "radians")
         for key in ("base", "flange", "tool"):
-            check_placement(key, getattr(self, key), self.dh.calibrated and key == "base")
+            check_placement(key, getattr(self, key), self.dh.calibrated and key != "tool")
         return self
 
     def _check_sizes(self) -> None:
@@ -890,7 +890,7 @@ def check_placement(field: str, placement: Placement | None, calibrated: bool = 
     ----------
     field : its key in the file, for the error
     placement : mm and deg; None passes
-    calibrated : whether lengths below 2 mm come from a calibration, which no one takes for metres
+    calibrated : whether lengths below 2 mm come from a calibration or a URDF, which no one takes for metres
 
     Raises
     ------

@@ -94,7 +94,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
     groups: dict[str, Content] = {
         "dh": {
             "convention": robot.convention,
-            "calibrated": _short(lengths) or bool(robot.beta.any()) or _shifted(robot.base),
+            "calibrated": _short(lengths) or bool(robot.beta.any()) or _shifted(robot.base) or _shifted(robot.flange),
             "rows": _rows(robot, "dh", dh_rows),
         },
         "zero": {"rows": _rows(robot, "zero", zero_rows)},
@@ -133,9 +133,9 @@ def _short(lengths_mm: np.ndarray) -> bool:
     )
 
 
-def _shifted(base: np.ndarray) -> bool:
-    """Whether a base is where only a calibration puts it, less than 2 mm off."""
-    return bool(RESIDUE_MM < np.abs(base[:3, 3]).max() * 1000 < SHORTEST_PLAIN_LENGTH_MM)
+def _shifted(T: np.ndarray) -> bool:
+    """Whether a base or flange is where only a calibration or a URDF puts it, less than 2 mm off."""
+    return bool(RESIDUE_MM < np.abs(T[:3, 3]).max() * 1000 < SHORTEST_PLAIN_LENGTH_MM)
 
 
 def _placements(robot: Robot) -> Iterator[tuple[str, dict]]:
@@ -143,8 +143,7 @@ def _placements(robot: Robot) -> Iterator[tuple[str, dict]]:
     for key in ("base", "flange", "tool"):
         T = getattr(robot, key)
         if not np.array_equal(T, np.eye(4)):
-            at = {"xyz_mm": T[:3, 3] * 1000, "rpy_deg": np.degrees(rpy_of(T))}
-            yield key, {name: list(map(_tidy, values)) for name, values in at.items()}
+            yield key, {"xyz_mm": [*map(_tidy, T[:3, 3] * 1000)], "rpy_deg": [*map(_tidy, np.degrees(rpy_of(T)))]}
 
 
 def _speed_rows(robot: Robot) -> list[dict]:

@@ -119,11 +119,9 @@ def import_urdf(
 def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> UrdfImport:
     found = urdf_tree.read_chain(path, base, tip, snap)
     robot, sources, coupling, shift, notes = _robot_of_chain(path, found)
-    moving = [joint for joint in found.joints if joint.moves]
     q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (MISFIT_POSES, len(sources)))
     values = q @ coupling.T + shift
-    given = _chain_forward(found.joints, values)
-    misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
+    misfit = np.linalg.norm((forward(robot, q) - _chain_forward(found.joints, values))[:, :3, 3], axis=1).max()
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
     shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
     visuals, unseen = link_visuals(path, root, robot, placed)
@@ -133,7 +131,8 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     shapes["meshes"] += seen
     lost += tuple(link_label(each.link) for each in seen)
     names = tuple(joint.name for joint in sources)
-    masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
+    moving = [joint.name for joint in found.joints if joint.moves]
+    masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, moving, names)
     robot, empty = without_placeholders(robot.replace(**shapes, visuals=visuals, masses=masses))
     stated = {
         "envelopes": any(shapes.values()),
@@ -149,16 +148,15 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     more = {
         group: Source(
             f"As {path.name} states it{but.get(group, '')}",
-            "export" if group != "envelopes" or not lost else "inferred",
+            "inferred" if lost and group == "envelopes" else "export",
         )
         for group, there in stated.items()
         if there
     }
     robot = robot.replace(sources={**robot.sources, **more})
-    first, last = found.joints[0].parent, found.joints[-1].child
     rounded = _unrounded(urdf_tree.read_chain(path, base, tip, False).joints, found.joints, values) if snap else ()
     said = (*empty, *rounded, *found.notes, *notes, *shaped, *unseen, *weighed)
-    return UrdfImport(robot, said, float(misfit), names, first, last)
+    return UrdfImport(robot, said, float(misfit), names, found.joints[0].parent, found.joints[-1].child)
 
 
 UrdfGroup = Literal["envelopes", "inertia", "drives"]
@@ -257,7 +255,11 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
         counts as fixed where it is at 0; with ``carried`` all that hangs on a link that moves
     """
     above = {joint.child: joint for joint in found.all.values()}
-    place = {found.joints[0].parent: (np.eye(4), 0)}
+    name = found.joints[0].parent
+    place = {name: (np.eye(4), 0)}
+    while (below := above.get(name)) and not below.moves:  # what the base is fixed on
+        place[below.parent] = place[name][0] @ np.linalg.inv(below.T_parent_joint), 0
+        name = below.parent
     for joint, _, T in _along(found.joints, shift[None]):
         place[joint.child] = T[0], place[joint.parent][1] + joint.moves
     last, led = len(shift), {joint.name for joint in found.joints if joint.moves}
@@ -278,7 +280,7 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
 
 def _hanging(found: urdf_tree.UrdfChain) -> set[str]:
     """The links of the chain, and all that hang on them, such as levers and fingers."""
-    links, joints = {found.joints[0].parent, *(joint.child for joint in found.joints)}, found.all.values()
+    links, joints = {found.joints[0].parent}, found.all.values()
     while more := {joint.child for joint in joints if joint.parent in links} - links:
         links |= more
     return links
@@ -324,13 +326,10 @@ def link_shapes(
         "hulls": tuple(shape for shape in shapes if isinstance(shape, ConvexPiece)),
         "meshes": tuple(link_mesh(number, np.concatenate(parts)) for number, parts in surfaces.items()),
     }
-    notes = (
-        [f"shapes of {', '.join(unread)} are left out ({next(iter(unread.values()))}); such links count as they look"]
-        if unread
-        else []
-    )
+    left_out = f"shapes of {', '.join(unread)} are left out"
+    notes = [f"{left_out} ({why}); such links count as they look" for why in unread.values()][:1]
     if astray:
-        notes.append(f"shapes of {', '.join(astray)} are left out: they do not move with the arm's chain")
+        notes.append(f"shapes of {urdf_tree.some(astray)} are left out: they do not move with the arm's chain")
     return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
 
 
@@ -374,8 +373,8 @@ def link_visuals(
         whole = link_mesh(number, np.concatenate(meshes))
         points, faces = simplified(whole.points, whole.faces, DRAWN_TRIANGLES // len(parts))
         found.append(link_mesh(number, points[faces]))
-    notes = [f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values()]
-    return tuple(found), tuple(notes[:1])
+    unseen = f"pictures show no visual geometry of {urdf_tree.some([*missing])}"
+    return tuple(found), tuple(f"{unseen}: {why}" for why in missing.values())[:1]
 
 
 def _coupling(

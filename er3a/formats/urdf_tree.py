@@ -153,7 +153,7 @@ class Tree:
             todo += self.by_parent.get(found[-1].child, [])
         if len(found) < len(self.by_name):
             reached = {joint.name for joint in found}
-            looped = _some([name for name in self.by_name if name not in reached])
+            looped = some([name for name in self.by_name if name not in reached])
             raise InputError(self.path, "joint", f"the joints {looped} form a closed loop", "A URDF is a tree")
         return found
 
@@ -274,7 +274,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
     tree = tree_of(path, snap)
     for named, link in (("--base", base), ("--tip", tip)):
         if link is not None and link not in tree.links:
-            raise InputError(path, named, f"there is no link '{link}'", f"Links: {_some(sorted(tree.links))}")
+            raise InputError(path, named, f"there is no link '{link}'", f"Links: {some(sorted(tree.links))}")
     back = tree.back_from(base) if base is not None else []
     if back and (tip is None or base not in [joint.child for joint in tree.up_from(tip)]):
         base = back[-1].child
@@ -284,7 +284,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
         joints = tree.up_from(tip)
         above = [joints[0].parent, *(joint.child for joint in joints)] if joints else [tip]
         if base is not None and base not in above:
-            raise InputError(path, "--base", f"link '{base}' is not above '{tip}'", f"Give one of {_some(above)}")
+            raise InputError(path, "--base", f"link '{base}' is not above '{tip}'", f"Give one of {some(above)}")
         joints = joints[above.index(base) if base is not None else 0 :]
     else:
         joints = _downwards(tree, base or _root(tree), notes)
@@ -295,7 +295,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
         if joint.moves and joint.type not in MOVING:
             remedy = f"Write {', '.join(MOVING)} or fixed"
             if joint.type in FREE:
-                remedy = f"Name where the arm begins by --base: {_some([each.child for each in joints])}"
+                remedy = f"Name where the arm begins by --base: {some([each.child for each in joints])}"
             problem = f"type '{joint.type}' is not a joint of a serial arm"
             raise InputError(path, f"joint {joint.name}", problem, remedy)
         if (apart := np.abs(joint.T_parent_joint[:3, 3]).max()) > MAX_APART_M:
@@ -308,7 +308,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
 def _notes_of(tree: Tree, joints: Sequence[UrdfJoint]) -> Iterator[str]:
     """The notes on joints, one for all joints of which the same is said, and one on those beyond the last."""
     if joints and (moving := tree.onward(link := joints[-1].child)[0]):
-        yield f"beyond the arm's last link {link} joints are kept at 0, as of a gripper: {_some(_names(moving))}"
+        yield f"beyond the last link {link} joints stay at 0, as of a gripper: {some([each.name for each in moving])}"
     yield from by_note([(note, joint.name) for joint in joints for note in joint.notes])
 
 
@@ -321,7 +321,7 @@ def by_note(said: Sequence[tuple[str, str]]) -> Iterator[str]:
     """
     for note in dict(said):
         first, *others = [name for each, name in said if each == note]
-        yield f"joint {first} {note}" + (f"; likewise {_some(others)}" if others else "")
+        yield f"joint {first} {note}" + (f"; likewise {some(others)}" if others else "")
 
 
 def tip_after(path: Path, base: str | None, joints: int) -> str | None:
@@ -388,7 +388,7 @@ def tree_of(path: Path, snap: bool) -> Tree:
 
 def _root(tree: Tree) -> str:
     if len(tree.roots) != 1:
-        problem = f"{len(tree.roots)} root links ({_some(tree.roots) or 'a closed loop'})"
+        problem = f"{len(tree.roots)} root links ({some(tree.roots) or 'a closed loop'})"
         raise InputError(tree.path, "joint", problem, "A serial chain has exactly one; name it by --base")
     return tree.roots[0]
 
@@ -404,8 +404,8 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
             break
         if len(active) > 1:
             ends = [end for joint in active for end in tree.ends(joint.child, count + joint.independent)]
-            problem = f"branches into moving joints {_some(_names(active))}"
-            raise InputError(tree.path, f"link {link}", problem, f"Name where the arm ends by --tip: {_some(ends)}")
+            problem = f"branches into moving joints {some([each.name for each in active])}"
+            raise InputError(tree.path, f"link {link}", problem, f"Name where the arm ends by --tip: {some(ends)}")
         if not active and len(moving) > 1:
             break
         if active and len(active) < len(moving):
@@ -416,15 +416,14 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
         chain.append((active or moving or onward)[0])
         link = chain[-1].child
     if passive:
-        notes.append(f"joints beside the chain that only follow others were left out: {_some(_names(passive))}")
+        notes.append(
+            f"joints beside the chain that only follow others were left out: {some([each.name for each in passive])}"
+        )
     return chain
 
 
-def _names(joints: list[UrdfJoint]) -> list[str]:
-    return [joint.name for joint in joints]
-
-
-def _some(names: list[str]) -> str:
+def some(names: Sequence[str]) -> str:
+    """Names in one line, at most ``SHOWN`` of them."""
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return ", ".join(names[:SHOWN]) + more
 
@@ -660,11 +659,9 @@ def masses_from_urdf(
     """
     found: dict[int, list[MassBody]] = {}
     notes: list[str] = []
-    astray: list[str] = []
     changed: dict[str, str] = {}
     for name, inertials, place in in_links(root, robot, places, "inertial", carried=True):
-        if place is None:
-            astray.append(name)
+        if place is None:  # it loads no joint
             continue
         try:
             body, T = body_of(name, inertials[0])
@@ -683,11 +680,9 @@ def masses_from_urdf(
         if body.mass > 0 or any(body.inertia):
             placed, number = place
             found.setdefault(number, []).append(moved(body, placed @ T))
-    if astray:
-        notes.append(f"masses of {', '.join(astray)} are left out: they do not move with the arm's chain")
     if changed:
         first, *others = changed
-        notes.append(f"link {first} has {changed[first]}" + (f"; likewise of {', '.join(others)}" if others else ""))
+        notes.append(f"link {first} has {changed[first]}" + (f"; likewise of {some(others)}" if others else ""))
     missing = [name for k, name in enumerate(moving) if k + 1 not in found]
     if found and missing:
         notes.append(f"no mass is given for what moves with {', '.join(missing)}")

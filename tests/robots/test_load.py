@@ -15,6 +15,7 @@ import yaml
 from er3a.errors import DoubtfulUnit, InputError, InputWarning, ShapeError
 from er3a.files.robot_file import Envelopes
 from er3a.files.robot_library import ROBOTS, load_robot
+from er3a.files.robot_writer import write_robot
 from er3a.files.yaml_file import parse
 from er3a.robots.robot import GRADES
 from testing.arms import make_arm, placement
@@ -244,6 +245,15 @@ def test_calibrated_tables_may_hold_short_lengths(write):
     assert "looks like metres" in refusal(write(short)).problem
     robot = load_robot(write(do(short, set_in("dh", "calibrated", to=True))))
     assert robot.d[1] == pytest.approx(0.3215e-3)
+
+
+@pytest.mark.parametrize("key", ["base", "flange"])
+def test_what_er3a_writes_it_does_not_doubt(key, tmp_path):
+    """A URDF's flange may be 0.24 mm off the last axis, as the KUKA KR 210 L150's is."""
+    T = np.eye(4)
+    T[0, 3] = 2.4e-4
+    write_robot(load_robot("er3_600").replace(name="arm", **{key: T}), tmp_path / "arm.yaml")
+    np.testing.assert_allclose(getattr(load_robot(tmp_path / "arm.yaml"), key), T, atol=1e-12)  # and no warning
 
 
 @pytest.mark.parametrize(

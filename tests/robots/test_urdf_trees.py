@@ -66,16 +66,24 @@ def peer_poses(path, names, q, frame):
 
 
 def test_two_arms_are_asked_for_by_name(written):
-    path = written(row(5), row(4, 10), row(3, 20, "l1"))
+    weight = '<link name="l10"><inertial><mass value="3"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
+    path = written(row(5), row(4, 10).replace('<link name="l10"/>', weight), row(3, 20, "l1"))
     with pytest.raises(InputError, match=r"branches into moving joints j0, j10.*by --tip: l4, l22, l13"):
         import_urdf(path)
     assert load_robot(path, tip="l4").joints == 5  # the arm that it names can be had in each way
     assert check_file(path, tip="l4") == "a URDF"
     first, second = import_urdf(path, tip="l4"), import_urdf(path, tip="l13", base="base")
     assert (first.robot.joints, second.robot.joints) == (5, 4)
+    assert not any("mass" in note for note in first.notes)  # what another arm weighs loads no joint of this one
     assert first.joints == ("j0", "j1", "j2", "j3", "j4")
+    box = '<collision><origin xyz="1 0 0"/><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    stand = path.read_text().replace('<link name="base"/>', f'<link name="base">{box}</link>')
+    path.write_text(stand.replace('name="j10" type="revolute"', 'name="j10" type="fixed"'))
     part = import_urdf(path, base="l10", tip="l13")
     assert (part.robot.joints, part.base, part.tip) == (3, "l10", "l13")
+    (post,) = part.robot.hulls  # on what the arm's base is fixed on
+    assert post.link == 0
+    np.testing.assert_allclose(np.mean(post.points, axis=0), [1, 0, -0.2], atol=1e-12)
     with pytest.raises(InputError, match="there is no link 'nose'"):
         import_urdf(path, tip="nose")
     with pytest.raises(InputError, match="'l10' is not above 'l4'"):

@@ -11,6 +11,7 @@ import yaml
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.along import clearance
+from er3a.collision.bodies import Bodies
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
@@ -19,7 +20,7 @@ from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results, read_scope
 from er3a.pipeline.stages import run
-from er3a.pipeline.stages.collision.compute import compute
+from er3a.pipeline.stages.collision.compute import _home, compute
 from er3a.pipeline.stages.collision.model import RESULTS
 from er3a.pipeline.stages.collision.page.played import events
 from er3a.pipeline.stages.inverse.compute import solve_target
@@ -225,6 +226,17 @@ def test_a_home_that_collides_hides_no_path_that_does(ends_deg, status, collidin
     verdict = compute(Study.model_validate(content), NAME).summary.verdict
     assert (verdict.status, verdict.finding.code) == (status, "collision.home_collides")
     assert (verdict.finding.nearest.name, [each.name for each in verdict.finding.colliding]) == ("free", colliding)
+
+
+@pytest.mark.parametrize(("lower_deg", "home_from"), [(-4, "chosen"), (-60, "zero")])
+def test_joints_at_0_near_a_limit_are_no_home(lower_deg, home_from, random):
+    robot = load_robot(NAME)
+    lower = np.where(np.arange(robot.joints) == 1, np.radians(lower_deg), robot.lower)
+    bodies = Bodies(robot.replace(lower=lower), None)
+    free = random.uniform(lower, robot.upper, (200, robot.joints))
+    found, home = _home(bodies, None, free[bodies.free(free)])
+    assert found == home_from
+    assert (np.minimum(home - lower, robot.upper - home) > 0.05 * (robot.upper - lower)).all()
 
 
 @pytest.mark.parametrize("home_deg", [[0.0] * 5, [0.0, 999.0, 0.0, 0.0, 0.0, 0.0]])

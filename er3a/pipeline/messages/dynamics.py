@@ -89,8 +89,8 @@ TEXTS = texts(
         "dynamics.overload": "Overload: {beyond} of {compared} comparisons beyond limits; worst: {tightest}.{rest}",
         "dynamics.rest": (
             "[Paths that may not be run, not counted: "
-            "{not_run:, }.][ Links without mass in the file, counted as massless: {missing_links:, }.][{doubts:?} "
-            "Doubts about the masses: {doubts}.][ Grade of the masses: {grade:data}; torques are as uncertain.]"
+            "{not_run:, }.][ Links without mass in the file, counted as massless: {missing_links:, }.][ "
+            "Doubts about the masses: {doubts:2; }.][ Grade of the masses: {grade:data}; torques are as uncertain.]"
         ),
         "missing_link": "link {link}: no mass given; {singular:dynamics.massless}",
         "point_mass": "link {link}: mass without inertia",

@@ -242,17 +242,19 @@ def _chosen(motions: list[ListedMotion]) -> tuple[Open, ...]:
 
 
 def _home(bodies: Bodies, given: Reals | None, free: Reals) -> tuple[model.HomeFrom, Reals]:
-    """Where places are joined to: the study's home, joints at 0 if that is free of overlap, regular and no limit,
-    where an arm is folded up and few moves lead away, or else one of the free joint vectors (k, n): of the ``HOMES``
-    nearest to the middle of the limits the one farthest from singular."""
+    """Where places are joined to: the study's home, joints at 0 if that is free of overlap, regular and a twentieth of
+    each range away from limits, where an arm is folded up and few moves lead away, or else one of the free joint
+    vectors (k, n): of the ``HOMES`` nearest to the middle of the limits the one farthest from singular."""
     robot = bodies.robot
     zero = np.clip(0.0, robot.lower, robot.upper)
+    middle = (robot.lower + robot.upper) / 2
+    ranges = np.maximum(robot.upper - robot.lower, 1e-9)
     if given is not None:
         return "study", given
-    regular = (robot.lower * robot.upper < 0).all() and not USUAL_NEAR.contains(robot, zero[None])[0]
+    regular = (np.abs(middle) < 0.45 * ranges).all() and not USUAL_NEAR.contains(robot, zero[None])[0]
     if not len(free) or (regular and bodies.free(zero[None])[0]):
         return "zero", zero
-    away = np.abs(free - (robot.lower + robot.upper) / 2) / np.maximum(robot.upper - robot.lower, 1e-9)
+    away = np.abs(free - middle) / ranges
     near = free[np.argsort(away.max(axis=1), kind="stable")[:HOMES]]
     return "chosen", near[conditioning(robot, near).smallest_singular_value.argmax()]
 
@@ -260,7 +262,7 @@ def _home(bodies: Bodies, given: Reals | None, free: Reals) -> tuple[model.HomeF
 def _overlap(bodies: Bodies, q: Reals) -> tuple[Pair | None, float]:
     """What overlaps at joint values (n,) by how much, m; None if nothing does."""
     smallest, nearest = bodies.min_distance(q[None])
-    overlap = bodies.pairs[nearest[0]] if nearest[0] >= 0 and smallest[0] < 0 else None
+    overlap = bodies.pairs[nearest[0]] if smallest[0] < 0 else None
     return overlap, float(-smallest[0])
 
 

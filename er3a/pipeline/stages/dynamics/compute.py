@@ -161,7 +161,7 @@ def verdict_of(
         it with. It passes only if nothing that the files leave open could change that.
     """
     missing = tuple(found.link for found in findings if is_one(found, "missing_link"))
-    doubts = len(findings) - len(missing)
+    doubts = tuple(found for found in findings if not is_one(found, "missing_link"))
     grade = None if masses is None or masses.grade in DOCUMENTED else masses.grade
     shown = {"missing_links": missing, "doubts": doubts, "grade": grade}
     if not uses:
@@ -176,8 +176,7 @@ def verdict_of(
         *skipped,
         *(path.summary.name for path in paths if (path.asked or nothing_runs) and not path.summary.counts),
     )
-    guessed = masses is not None and masses.grade == "inferred"
-    open_ = unsettled or doubts or needs or not_run or guessed
+    open_ = unsettled or doubts or needs or not_run or grade == "inferred"
     code = "dynamics.overload" if beyond else "dynamics.marginal" if open_ else "dynamics.fits"
     status: Status = "fail" if beyond else "caution" if open_ else "pass"
     counts = {"compared": len(uses), "beyond": beyond, "unsettled": unsettled, "unknown": needs, "not_run": not_run}

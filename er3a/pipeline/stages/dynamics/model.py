@@ -61,7 +61,7 @@ within what is known: not with the tolerances of the masses, or not all was exam
 what the files leave open, wholly or in part; torques and limits that rest on it were not examined. ``not_run``:
 paths that are to be run, and may not be: they count for nothing. Without any limit ``dynamics.no_limits``: the
 largest torque on a path that counts, and the one at rest where that is larger. All have ``missing_links`` without
-mass, which count as massless, the number of ``doubts`` on masses besides, and the ``grade`` of the masses, where no
+mass, which count as massless, the ``doubts`` on masses besides, and the ``grade`` of the masses, where no
 document or scale gives them, else None."""
 
 
