@@ -17,13 +17,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError, RobotError
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
@@ -64,7 +64,7 @@ PROBLEMS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ArmModel:
     """An arm with its load, ready for batches. Joint values, velocities and accelerations are (N, n), contiguous.
 
@@ -248,7 +248,7 @@ AROUND = STEPS[np.abs(STEPS).sum(axis=1) > 0] / np.linalg.norm(STEPS[np.abs(STEP
 """26 directions: a ball by their points is too small by 8 % of its radius at most."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LinkShape:
     """The shape of a link in the frame that moves with its joint.
 

@@ -7,11 +7,11 @@ grid over its whole range, then refines the grid about it. In the end all joints
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.joint_limits import within
@@ -25,7 +25,7 @@ MAX_ROUNDS = 12  # over all joints
 NO_BETTER = 1e-9  # of the value: a round that gains less is the last
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Maxima:
     """The largest values (k,) found of k objectives, and the poses (k, n) where they are."""
 

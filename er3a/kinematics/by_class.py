@@ -9,12 +9,13 @@ which is traced and listed with its member nearest to the reference. Random star
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import frame_along, rotation_angle, transposed
 from er3a.kinematics.chain import constant_links, joint_starts, size_of
@@ -55,7 +56,7 @@ SCANNED = 16  # values of a redundancy parameter from which self-motions are col
 TRIED, CLOSER = 32, 3  # values that are tried where the one asked for has no rows; how often closer ones are
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ArmSolver:
     """An arm's chain of m rows as its solver takes it.
 
@@ -85,7 +86,7 @@ class ArmSolver:
         return PoseChain.of(links, self.sliding, T @ self.task_frame, self.size, TRACED.get(self.chain.code, POSE))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Settled:
     """Solutions of one pose: isolated ones, and self-motions, nearest to the reference first."""
 
@@ -324,7 +325,7 @@ def nearest_value(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Reals:
     return found
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LazySelfMotions(Sequence[SelfMotionCurve]):
     """What :func:`all_motions` gives, traced when it is first read."""
 
@@ -381,7 +382,7 @@ def _is_same_root(robot: Robot, x: Reals, others: list[Reals], chain: PoseChain)
     return apart < SAME_ROW or (apart < MAYBE_SAME and apart * chain.smallest(x) < SPREAD)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ClassSlots:
     """All slots of a block of poses.
 

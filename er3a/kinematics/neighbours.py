@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Reals
@@ -29,7 +29,7 @@ Usable = Callable[[Reals], Flags]
 """Which arms (N, n), rad, within the limits count, (N,)."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Neighbours:
     """Poses near a refused one that have a solution within the limits.
 

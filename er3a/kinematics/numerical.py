@@ -23,12 +23,12 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import NamedTuple
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
@@ -372,7 +372,7 @@ def all_found(robot: Robot, T: Reals, starts: int) -> Reals:
     return q[distinct(robot, q, SAME_ARM)]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Search:
     """A search for poses of one robot: what must be met, to which tolerances (m, rad), from which random numbers."""
 

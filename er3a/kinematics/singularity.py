@@ -29,7 +29,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from er3a.by_value import Displayed, Sheet
+from er3a.by_value import Displayed, Sheet, by_identity, frozen
 from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.kinematics.chain import arm_length, axes_at_zero_theta, constant_links, row_values
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
@@ -76,7 +76,7 @@ class Conditioning(Displayed):
         return Sheet.of_table(f"Conditioning at {count} joint vector(s)", columns, zip(*measures))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class DeterminantFactors:
     """Signed distances from the three singular sets; a change of sign is a crossing.
 
@@ -246,7 +246,7 @@ MAX_SAMPLES = 200_000  # of a motion; beyond that it is judged as it is sampled
 TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
 
 
-@dataclass(frozen=True)
+@frozen
 class RankLoss:
     """A stretch of a motion with a nearly dependent Jacobian.
 
@@ -454,7 +454,7 @@ def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
 MIN_SINGULAR_VALUE = 0.02  # as about 5 deg from an aligned wrist, where a wrist counts as near-singular
 
 
-@dataclass(frozen=True)
+@frozen
 class NearSingular:
     """Distance from each singular set below which a pose is near-singular.
 

@@ -13,14 +13,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy
 from numpy.polynomial import chebyshev
 
-from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.by_value import ByValue, Displayed, Sheet, by_identity, frozen
 from er3a.numerics.arrays import Integers, Reals
 from er3a.planning.profiles import Rates, pieces_at
 
@@ -37,7 +36,7 @@ INSET = (
 Stretch = tuple[float, float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Pieces:
     """A scalar function of time, one Chebyshev series for each piece.
 
@@ -144,7 +143,7 @@ class Pieces:
         return most, at
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class PiecewiseMotion(ByValue, Displayed):
     """A motion of n joints.
 

@@ -10,12 +10,12 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity, frozen
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Integers, Reals
 
@@ -26,7 +26,7 @@ BEYOND = 1e-6  # by which times and shares may miss a motion's ends, of the whol
 Ends = tuple[Reals | float, Reals | float]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Times:
     """When a sequence is at its corners; start and end count as corners.
 
@@ -40,7 +40,7 @@ class Times:
     corner: Integers
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LegTimes:
     """How long each leg of a sequence takes that stops at all its corners.
 
@@ -181,7 +181,7 @@ def trapezoid(t: Reals, duration: float, ramp: float | Reals) -> Rates:
     return x, dx / duration, ddx / duration**2
 
 
-@dataclass(frozen=True)
+@frozen
 class MotionLaw:
     """A trapezoidal speed profile.
 
@@ -261,7 +261,7 @@ class TimeLaw(Protocol):
     def __call__(self, t: Reals) -> Rates: ...
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class FromRestToRest:
     """From one halt to the next, on the quintic, or on the trapezoid if ``ramp`` is given.
 

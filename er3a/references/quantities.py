@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal, cast
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.geometry.transforms import log_rotation
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
@@ -39,7 +40,7 @@ COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
 FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": -1}
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ModelState:
     """What quantities are read from.
 
@@ -99,7 +100,7 @@ class ModelState:
         return T[..., :3, 2] * sign * self.direction[..., row, None], T[..., :3, 3] * MM
 
 
-@dataclass(frozen=True)
+@frozen
 class Quantity(ABC):
     """One number about an arm; ``depends_on_table``: not on the joints' limits and speeds alone."""
 
@@ -162,7 +163,7 @@ class Quantity(ABC):
         return abs(expected - other_expected)
 
 
-@dataclass(frozen=True)
+@frozen
 class AxisAngle(Quantity):
     """Angle between a joint's axis in the zero pose and a direction; ``signed``: the direction of positive rotation."""
 
@@ -219,7 +220,7 @@ class AxisAngle(Quantity):
         return float(angle_between(np.array(self.toward), np.array(same.toward), self.signed and same.signed))
 
 
-@dataclass(frozen=True)
+@frozen
 class AxisCoordinate(Quantity):
     """A coordinate (base frame) of that point of a joint's axis, in the zero pose, which is nearest to ``point_mm``."""
 
@@ -248,7 +249,7 @@ class AxisCoordinate(Quantity):
         return AxisCoordinate, self.joint
 
 
-@dataclass(frozen=True)
+@frozen
 class QuantityAtPose(Quantity):
     """One number about an arm at a pose (manufacturer's angles, deg)."""
 
@@ -275,7 +276,7 @@ def value_at(pose: Pose, joint: int) -> float:
     return pose[joint - 1] if joint <= len(pose) else 0.0
 
 
-@dataclass(frozen=True)
+@frozen
 class PointCoordinate(QuantityAtPose):
     """A coordinate (base frame) of the flange or the wrist centre at a pose."""
 
@@ -301,7 +302,7 @@ class PointCoordinate(QuantityAtPose):
         return self.pose, self.point
 
 
-@dataclass(frozen=True)
+@frozen
 class FlangeTurn(QuantityAtPose):
     """A coordinate (base frame) of the rotation vector from a stated orientation of the flange to the arm's.
 
@@ -347,7 +348,7 @@ class FlangeTurn(QuantityAtPose):
         return abs(float(rotation_vectors_deg(turn)[COORDINATES.index(self.coordinate)]))
 
 
-@dataclass(frozen=True)
+@frozen
 class SectionCoordinate(QuantityAtPose):
     """The wrist centre in a side view (joint 1 at 0): x from axis 1, z from axis 2; ``unsigned``: ``|x|``, ``|z|``."""
 
@@ -374,7 +375,7 @@ class SectionCoordinate(QuantityAtPose):
         return SectionCoordinate, self.pose
 
 
-@dataclass(frozen=True)
+@frozen
 class SegmentAngle(Quantity):
     """Angle from the vertical (base z) of the upper arm or the forearm in the zero pose.
 
@@ -433,7 +434,7 @@ class SegmentAngle(Quantity):
         return vector
 
 
-@dataclass(frozen=True)
+@frozen
 class OfJoint(Quantity):
     """What the robot's file says of a joint besides the table; ``slides``: the joint is prismatic."""
 
@@ -456,7 +457,7 @@ class OfJoint(Quantity):
         return own * MM if self.slides else np.degrees(own)
 
 
-@dataclass(frozen=True)
+@frozen
 class Limit(OfJoint):
     """A joint's ``lower`` or ``upper`` limit."""
 
@@ -481,7 +482,7 @@ class Limit(OfJoint):
         return self.as_stated(state.lower if self.side == "lower" else state.upper)
 
 
-@dataclass(frozen=True)
+@frozen
 class Speed(OfJoint):
     """A joint's maximum speed; NaN where the robot's file gives none."""
 
@@ -504,7 +505,7 @@ class Speed(OfJoint):
         return self.as_stated(state.speed)
 
 
-@dataclass(frozen=True)
+@frozen
 class LimitExcess(QuantityAtPose):
     """How far a pose lies outside the joint limits: largest excess of a joint (mm of one that slides), 0 inside."""
 
@@ -531,7 +532,7 @@ class LimitExcess(QuantityAtPose):
         return excess
 
 
-@dataclass(frozen=True)
+@frozen
 class Extreme(Quantity):
     """Largest or smallest value of a measure of a point over all joint angles within the limits."""
 
@@ -565,7 +566,7 @@ class Extreme(Quantity):
         return np.asarray(state.extremes[self])
 
 
-@dataclass(frozen=True)
+@frozen
 class AxisDistance(Extreme):
     """The point's distance from the axis of joint 1 or 2."""
 
@@ -587,7 +588,7 @@ class AxisDistance(Extreme):
         return np.sqrt(_dot(across, across))
 
 
-@dataclass(frozen=True)
+@frozen
 class SectionExtent(Extreme):
     """The point's coordinate in the side view: joint 1 at 0, x from axis 1, z from axis 2."""
 

@@ -21,11 +21,11 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import frame_along, rot_x, rot_z
 from er3a.geometry.vectors import TURN, Vector, dot, in_frame_of
 from er3a.kinematics.chain import axes_of, meeting_point, poses_of
@@ -227,7 +227,7 @@ class ArmAngleConstants(NamedTuple):
     zero_4: float
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ArmAngleArm:
     """The solver of one arm: its links (8, 4, 4) and constants."""
 

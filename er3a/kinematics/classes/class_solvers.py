@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import by_identity, frozen
 from er3a.geometry.transforms import exp_rotation
 from er3a.geometry.vectors import Vector, wrap_to_pi
 from er3a.kinematics.chain import axes_of, poses_of, size_of
@@ -44,7 +45,7 @@ ArmClassCode = Literal[
 ]
 
 
-@dataclass(frozen=True)
+@frozen
 class ArmClassTraits:
     """What is known of a class, in addition to its solver.
 
@@ -127,7 +128,7 @@ DOUBLE_ROOT = 1e-6  # rad or m: rows so near are one, split by rounding
 NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
 
 
-@dataclass(frozen=True)
+@frozen
 class Redundancy:
     """What a pose leaves open in chains of seven and more: a joint (from 0), or the arm angle (-1)."""
 
@@ -209,7 +210,7 @@ class ChainSolver(ABC):
         return ()
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SphericalWristSolver(ChainSolver):
     """Axes 2 and 3 parallel, and a spherical wrist."""
 
@@ -276,7 +277,7 @@ class SphericalWristSolver(ChainSolver):
         return _names_by_side(self.links, self.constants.wrist_in_tool, x)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ParallelAxes(ChainSolver):
     """Axes 2, 3 and 4 parallel, 5 and 6 meet."""
 
@@ -356,7 +357,7 @@ BranchSolver = SphericalWristSolver | ParallelAxes
 """Classes whose eight branches are known where no joint is free and no two meet, without a second look."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class EliminationSolver(ChainSolver):
     """Any six joints of which at most two slide."""
 
@@ -381,7 +382,7 @@ class EliminationSolver(ChainSolver):
         return found.q, found.certainty
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ArmAngle(ChainSolver):
     """Seven joints with a spherical shoulder and wrist; self-motions are collected over the arm angle."""
 
@@ -435,7 +436,7 @@ class ArmAngle(ChainSolver):
         return tuple(SLOT_NAMES[first + 4 * (s // 2 % 2) + 2 * (s // 4) + s % 2] for s in range(8))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class GantrySolver(ChainSolver):
     """Six joints, three of them prismatic."""
 
@@ -473,7 +474,7 @@ class GantrySolver(ChainSolver):
         return "wrist_plus", "wrist_minus"
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ScaraSolver(ChainSolver):
     """Four joints of one direction, one of them prismatic."""
 
@@ -512,7 +513,7 @@ class ScaraSolver(ChainSolver):
         return "elbow_plus", "elbow_minus"
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PaddedChain(ChainSolver):
     """Fewer than six joints, solved with joints that the chain lacks at these places (from 0, rising)."""
 
@@ -568,7 +569,7 @@ class PaddedChain(ChainSolver):
         return self.rest.names(full)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LinkedRows(ChainSolver):
     """A chain whose rows a linkage moves together (a levelling one, say): those of its solutions that keep to it.
 

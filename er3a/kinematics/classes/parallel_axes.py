@@ -20,11 +20,11 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.vectors import TURN, Vector, dot
 from er3a.kinematics.block_inverse import (
     MARK,
@@ -90,7 +90,7 @@ class ParallelConstants(NamedTuple):
     near_m: float
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ThreeParallel:
     """The solver of one arm: its links (7, 4, 4) and constants."""
 

@@ -16,10 +16,10 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import frame_along, inverted
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import axes_of, meeting_point, poses_of, size_of
@@ -41,7 +41,7 @@ WRIST = 1e-9  # squared half tilt of the wrist, about
 POSE = 1e-10  # what rows may miss a pose by
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SlideAndWrist:
     """The solver of one arm, lengths in units of its size.
 

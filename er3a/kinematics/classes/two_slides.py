@@ -18,11 +18,11 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import inverted
 from er3a.kinematics.chain import poses_of, size_of
 from er3a.kinematics.classes.hidden_joint import HARMONICS, SAMPLE_ANGLES, SAMPLES
@@ -70,7 +70,7 @@ class SlideReading(NamedTuple):
     usual: float
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class TwoSlides:
     """What the solver keeps of a chain: links in units of its size, and readings of its loop, best first."""
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from er3a.by_value import frozen
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM, Tolerances
 from er3a.errors import DoubtfulUnit, Er3aError
 from er3a.finding import plain
@@ -46,7 +47,7 @@ OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbe
 _ARM = "a D-H table in any form (- is standard input), a robot's name or file, a URDF or xacro"
 
 
-@dataclass(frozen=True)
+@frozen
 class CompareRequest:
     """What a call of ``er3a compare`` asks for: how files are read, tolerances (mm, deg), and what is written."""
 
