@@ -343,7 +343,7 @@ def _outline(part: Envelope | Reals) -> Reals:
 
 
 def filled(points: Reals, density: float = WATER) -> MassBody:
-    """The hull of points, filled with a material, as tetrahedra about its middle [4]_.
+    """The hull of points, filled with a material.
 
     Parameters
     ----------
@@ -353,21 +353,12 @@ def filled(points: Reals, density: float = WATER) -> MassBody:
     Returns
     -------
     body : in the frame of the points, inertia about its own centre
-
-    References
-    ----------
-    .. [4] F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", J. Math. Stat. 1 (2005).
     """
-    hull, middle = scipy.spatial.ConvexHull(points), points.mean(axis=0)
-    corners = points[hull.simplices] - middle
-    mass = density * np.abs(np.linalg.det(corners)) / 6
-    sums = corners.sum(axis=1)
-    second = np.einsum("t,ti,tj->ij", mass, sums, sums) + np.einsum("t,tki,tkj->ij", mass, corners, corners)
-    whole, centre = float(mass.sum()), mass @ sums / 4 / mass.sum()
-    # Second moments about the middle, then about the centre of mass.
-    second = second / 20 - whole * np.outer(centre, centre)
-    x, y, z = (middle + centre).tolist()
-    return MassBody(whole, (x, y, z), six_moments(np.trace(second) * np.eye(3) - second))
+    from trimesh.convex import convex_hull  # takes a while
+
+    found = convex_hull(points).mass_properties
+    x, y, z = found.center_mass.tolist()
+    return MassBody(density * float(found.mass), (x, y, z), six_moments(density * found.inertia))
 
 
 def capsule_body(capsule: Envelope, density: float) -> MassBody:
