@@ -16,7 +16,6 @@ from er3a.errors import DoubtfulUnit, Er3aError
 from er3a.finding import plain
 from er3a.pipeline.commands.dh_options import Angles, Conventions, Lengths
 from er3a.pipeline.commands.options import (
-    ROBOT_FILES,
     AsJson,
     Base,
     Columns,
@@ -65,7 +64,7 @@ class CompareRequest:
         return Tolerances(self.tolerance_mm / 1000, math.radians(self.tolerance_deg))
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@app.command()
 def compare(
     a: Annotated[str, typer.Argument(metavar="A", help=f"the arm to test: {_ARM}")],
     others: Annotated[

@@ -12,13 +12,10 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-FIRST = "Studies"
 ROBOT_FILES = "Robot files"
-PROGRAMS = "Robot programs"
-JOBS = "Single jobs, called by the workflow"
 
 _GROUPS = {
-    ("studies", FIRST): {
+    ("studies", "Studies"): {
         "new": "Write a study for an arm: robot file, scene, targets and paths that the arm can do, README.",
         "check": "Check input files: print the kind of each file, or its error; of a URDF also the "
         "rules that it breaks.",
@@ -51,11 +48,11 @@ _GROUPS = {
     ("single_jobs", ROBOT_FILES): {
         "teach": "Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.",
     },
-    ("programs", PROGRAMS): {
+    ("programs", "Robot programs"): {
         "check-program": "Check each motion of robot programs. Findings are lines: file:line: level: message \\[code].",
         "program": "Write robot programs from paths.",
     },
-    ("single_jobs", JOBS): {
+    ("single_jobs", "Single jobs, called by the workflow"): {
         "compute": "Compute a stage: tables and summary.json.",
         "views": "Write a robot's recordings (always in English), a picture of each, and pages from results.",
         "index": "Write the index.",
