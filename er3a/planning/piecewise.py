@@ -438,11 +438,8 @@ def interpolated(values: Reals) -> Reals:
     -------
     series : (m, d + 1, n)
     """
-    count = values.shape[1]
-    angles = np.pi * (np.arange(count) + 0.5) / count
-    basis = np.cos(np.outer(np.arange(count), angles)) * 2 / count
-    basis[0] /= 2
-    found: Reals = np.einsum("kc,mcn->mkn", basis, values)
+    found: Reals = scipy.fft.dct(values, axis=1) / values.shape[1]
+    found[:, 0] /= 2
     return found
 
 
@@ -472,9 +469,5 @@ def evaluated(series: Reals, i: Integers, x: Reals) -> Reals:
     -------
     values : (..., n)
     """
-    x = x[..., None]
-    b1 = b2 = np.zeros(series.shape[2])
-    for k in range(series.shape[1] - 1, 0, -1):
-        b1, b2 = series[i, k] + 2 * x * b1 - b2, b1
-    value: Reals = series[i, 0] + x * b1 - b2
-    return value
+    coefficients = np.moveaxis(series[i], -2, 0)
+    return np.asarray(chebyshev.chebval(x[..., None], coefficients, tensor=False), np.float64)

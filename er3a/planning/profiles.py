@@ -316,7 +316,7 @@ class Timetable:
         slopes = scipy.interpolate.PchipInterpolator(self.times, self.progress).derivative()(self.times)
         slopes[np.asarray(halts, bool)] = 0.0
         slopes[[0, -1]] = 0.0
-        self._slopes = slopes
+        self._curve = scipy.interpolate.CubicHermiteSpline(self.times, self.progress, slopes)
 
     @property
     def breaks(self) -> Reals:
@@ -330,14 +330,9 @@ class Timetable:
 
     def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
-        t, i = pieces_at(t, self.times)
+        check_times(t := np.asarray(t, float), self.times[0], self.times[-1])
         t = np.clip(t, self.times[0], self.times[-1])
-        h, start = self.times[i] - self.times[i - 1], self.progress[i - 1]
-        step, v0, v1 = self.progress[i] - start, h * self._slopes[i - 1], h * self._slopes[i]
-        u = (t - self.times[i - 1]) / h
-        c2, c3 = 3 * step - 2 * v0 - v1, v0 + v1 - 2 * step
-        x = start + u * (v0 + u * (c2 + u * c3))
-        return x, (v0 + u * (2 * c2 + 3 * u * c3)) / h, (2 * c2 + 6 * u * c3) / h**2
+        return self._curve(t), self._curve(t, 1), self._curve(t, 2)
 
 
 def times_at(law: TimeLaw, shares: Reals) -> Reals:
