@@ -130,7 +130,7 @@ def starting_table(robot: Robot) -> dict[str, Any]:
     return {
         "convention": robot.convention,
         **{name: getattr(robot, name).tolist() for name in names},
-        "coupling": (np.eye(robot.rows) if robot.coupling is None else robot.coupling).tolist(),
+        "coupling": robot.joint_to_row.tolist(),
     }
 
 

@@ -449,11 +449,7 @@ def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.
 def _joints_paired(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> tuple[Reals, CouplingLayer]:
     """+1 or -1 for each joint (n,), -1 where B's pendant counts in the other direction, and whether couplings agree."""
     rows = np.where(found.reverses, -1.0, 1.0)
-    if robot_a.coupling is None and robot_b.coupling is None:
-        return rows, CouplingLayer(True)
-    own, other = (
-        np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling for robot in (robot_a, robot_b)
-    )
+    own, other = robot_a.joint_to_row, robot_b.joint_to_row
     turned = rows[:, None] * other  # what A's rows would move by for B's joints
     with_same, with_other = np.abs(turned - own).sum(axis=0), np.abs(turned + own).sum(axis=0)
     signs = np.where(with_other < with_same, -1.0, 1.0)

@@ -317,8 +317,7 @@ def _corrected(robot: Robot, solution: Solution, count: int) -> Robot:
             ends = np.sort(np.stack([sign * (robot.lower - shift), sign * (robot.upper - shift)]), axis=0)
             found = found.replace(direction=found.direction * sign, lower=ends[0], upper=ends[1])
         else:
-            own = np.eye(robot.joints) if robot.coupling is None else robot.coupling
-            found = found.replace(coupling=own @ factors)
+            found = found.replace(coupling=robot.joint_to_row @ factors)
     if not (solution.entries or solution.explanation.free or solution.explanation.joints.faults):
         return found
     source = Source(f"Fitted to {count} poses of the controller, starting from {robot.name}", "inferred")

@@ -342,8 +342,7 @@ class Fitter:
     def _whitening(self, state: State) -> Reals:
         """(N, 6, 6), which make standard deviations of differences; rows of 0 for orientations that are not given."""
         robot, pairs, seen = self.robot, self.pairs, state.seen
-        coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        by_joint = coupling @ state.explanation.joints.factors
+        by_joint = robot.joint_to_row @ state.explanation.joints.factors
         J = effects(state.arm, seen.row_values, seen.points(state.arm)) @ by_joint
         J *= (pairs.q_digit * ROUNDED)[:, None]
         turned = np.repeat(pairs.turn_digit, 3, axis=1)

@@ -209,8 +209,7 @@ def arm_model(robot: Robot, load: Load | None = None, gravity: float = GRAVITY) 
             raise RobotError(robot.name, f"{named} {PROBLEMS[problem]}")
         inertia = pin.Inertia(body.mass, np.array(body.centre), body.inertia_matrix)
         model.appendBodyToJoint(robot.rows if link is None else link, inertia, pin.SE3.Identity())
-    coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-    return ArmModel(robot, load, model, robot.direction[:, None] * coupling, tuple(bodies))
+    return ArmModel(robot, load, model, robot.direction[:, None] * robot.joint_to_row, tuple(bodies))
 
 
 def flange_in_last_link(robot: Robot) -> Reals:

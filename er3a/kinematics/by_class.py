@@ -9,7 +9,6 @@ which is traced and listed with its member nearest to the reference. Random star
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -91,7 +90,7 @@ class Settled:
     """Solutions of one pose: isolated ones, and self-motions, nearest to the reference first."""
 
     alone: Reals
-    motions: tuple[SelfMotionCurve, ...] = field(default=())
+    motions: tuple[SelfMotionCurve, ...] = ()
 
 
 @derived
@@ -206,7 +205,7 @@ def class_rows(robot: Robot, T: Reals, values: Reals) -> Reals:
     return to_joints(robot, arm_solver(robot).chain.rows(T, values)[0])
 
 
-def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, certainty: int) -> Settled:
+def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, certainty: int) -> Settled:
     """Solutions of one pose, divided into isolated ones and self-motions.
 
     Parameters
@@ -214,7 +213,6 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     T : (4, 4), m
     rows : (k, n), rad or m, what the class found, without NaN
     q_ref : (n,), rad or m
-    values : (1, k), of the redundancy parameters
     certainty : of the class at this pose
 
     Returns
@@ -283,7 +281,7 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
     grid = np.concatenate([values, _scanned(robot, SCANNED)])
     q = class_rows(robot, np.broadcast_to(T, (len(grid), 4, 4)), grid).reshape(-1, robot.joints)
     more = to_joints(robot, solver.poses_at(T).roots(_starts(robot, STARTS)))  # curves between the values scanned
-    return settle(robot, T, np.concatenate([q[np.isfinite(q[:, 0])], more]), q_ref, values, CERTAIN)
+    return settle(robot, T, np.concatenate([q[np.isfinite(q[:, 0])], more]), q_ref, CERTAIN)
 
 
 def _scanned(robot: Robot, count: int) -> Reals:
@@ -450,7 +448,7 @@ def slots_of_class(
     for n in np.flatnonzero(certainty != CERTAIN).tolist() if alone else ():
         own = q_ref[0 if len(q_ref) == 1 else n]
         rows = unwound(robot, q[n])
-        settled[n] = settle(robot, T[n], rows[np.isfinite(rows[:, 0])], own, values[n : n + 1], int(certainty[n]))
+        settled[n] = settle(robot, T[n], rows[np.isfinite(rows[:, 0])], own, int(certainty[n]))
         q[n] = nearest_equivalent(robot, _in_slots(robot, rows, settled[n]), own)
         inside[n] = within(robot, q[n])
     each_its_own = alone and len(q_ref) == count

@@ -444,8 +444,7 @@ class _Search:
         )
         low, high = (robot.lower, robot.upper) if respect else self.without_limits()
         limits, q = (for_kernel(low / units), for_kernel(high / units), respect), q0 / units
-        motion = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        motion = for_kernel(robot.direction[:, None] * motion * units)
+        motion = for_kernel(robot.direction[:, None] * robot.joint_to_row * units)
         arm = motion, joint_starts(robot), for_kernel(constant_links(robot)), for_kernel(robot.sliding)
         goal, T = (for_kernel(self.mask), for_kernel(self.tolerances), length), for_kernel(T)
 

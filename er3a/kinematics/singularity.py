@@ -304,13 +304,11 @@ def change_per_joint(robot: Robot) -> Reals:
     slide = np.zeros(len(points))
     if robot.sliding.any():
         most = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
-        coupling = np.eye(robot.rows) if robot.coupling is None else np.abs(robot.coupling)
-        slide = np.where(robot.sliding, coupling @ most, 0.0)
+        slide = np.where(robot.sliding, np.abs(robot.joint_to_row) @ most, 0.0)
     path = np.vstack([points, T[:3, 3]])
     reach = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum() + slide.sum()) / arm_length(robot)
     columns = np.sqrt(robot.joints * (1.0 + (2.0 * reach) ** 2))
-    weight = np.ones(robot.joints) if robot.coupling is None else np.abs(robot.coupling).sum(axis=0)
-    return np.asarray(np.full(robot.joints, columns) * weight)
+    return np.asarray(columns * np.abs(robot.joint_to_row).sum(axis=0))
 
 
 def rank_losses(

@@ -517,7 +517,7 @@ def _jacobian_rate(robot: Robot, J: Reals, dq: Reals) -> Reals:
     A row i that turns by w_i has the linear column v_i; turning row j changes w_i by w_j x w_i if j comes first, and
     v_i by w_j x v_i if j is not after i, else by w_i x v_j. Both v may be divided by any length.
     """
-    coupling = np.eye(J.shape[2]) if robot.coupling is None else robot.coupling
+    coupling = robot.joint_to_row
     columns = np.swapaxes(J @ np.linalg.inv(coupling), 1, 2)
     moving = columns * (dq @ coupling.T)[..., None]
     v, w = columns[..., :3], columns[..., 3:]

@@ -372,8 +372,7 @@ def singular_events(robot: Robot, motion: PiecewiseMotion, near: singularity.Nea
 
 def _distances(robot: Robot, motion: PiecewiseMotion) -> tuple[Reals, Reals]:
     """Times (k + 1,), s, between which turns are short; series (3, k, d + 1) of the two sines and the shoulder's m."""
-    coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-    turning = (motion.angle[:, 1:] @ coupling.T)[..., 1:5]  # the first and the last axis turn all there is
+    turning = (motion.angle[:, 1:] @ robot.joint_to_row.T)[..., 1:5]  # the first and the last axis turn all there is
     turned = 2 * np.nan_to_num(np.abs(turning)).sum(axis=(1, 2))
     parts = np.maximum(1, np.ceil(turned / LONGEST_TURN)).astype(int)
     piece = np.repeat(np.arange(len(parts)), parts)

@@ -215,7 +215,7 @@ class _Moves:
 
     def __init__(self, robot: Robot, bodies: Bodies, margin: float) -> None:
         self.bodies, self.margin = bodies, margin
-        self.coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
+        self.coupling = robot.joint_to_row
         T = link_frames(robot, np.zeros(len(robot.lower)))
         origins = T[[capsule.link for capsule in bodies.capsules], None, :3, 3]
         reach = np.linalg.norm(bodies.ends(np.zeros(len(robot.lower))) - origins, axis=-1).max()

@@ -30,7 +30,7 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue, slotted
-from er3a.geometry.transforms import exp_rotation, log_rotation, rpy_of, transform
+from er3a.geometry.transforms import exp_rotation, log_rotation, quaternion_of, rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import MassBody
 
@@ -362,5 +362,5 @@ def numbers_of(T: Reals, convention: Convention) -> tuple[float, ...]:
     elif convention == "ur":
         turned = log_rotation(T[:3, :3])
     else:
-        turned = scipy.spatial.transform.Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True)[[3, 0, 1, 2]]
+        turned = quaternion_of(T)
     return tuple(float(each) + 0.0 for each in (*xyz, *turned))

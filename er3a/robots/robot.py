@@ -337,6 +337,11 @@ class Robot(ByValue, Displayed):
         return len(self.a)
 
     @property
+    def joint_to_row(self) -> Reals:
+        """(m, n), the coupling, or the identity where the robot has none: ``u = joint_to_row @ q``."""
+        return np.eye(self.rows) if self.coupling is None else self.coupling
+
+    @property
     def slides(self) -> Flags:
         """(n,) bool, joints of q that are distances: the row of their number slides, or else one that they move."""
         return slides_of(self.sliding, self.coupling)

@@ -70,7 +70,7 @@ def whole_turns(robot: Robot) -> WholeTurns:
     Where a coupling moves more rows than there are joints, the lattice is made of those joints alone that a whole turn
     brings back.
     """
-    coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
+    coupling = robot.joint_to_row
     # A whole turn of a joint changes nothing if it turns each row by whole turns, and moves no row that slides.
     parts = np.where(robot.sliding[:, None], coupling, coupling - np.round(coupling))
     alone = ~robot.slides & (np.abs(parts) <= WHOLE).all(axis=0)

@@ -104,8 +104,7 @@ def general_arm(robot: Robot) -> tuple[GeneralArm, Reals, Reals]:
     lower, upper = ends.T.copy()
     drive, start, v_lower, v_upper = np.eye(n), np.zeros(n), lower, upper
     if coupled(robot):
-        coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        drive = np.ascontiguousarray((robot.direction[:, None] * coupling)[:n])
+        drive = np.ascontiguousarray((robot.direction[:, None] * robot.joint_to_row)[:n])
         start, v_lower, v_upper = joint_starts(robot)[:n].copy(), robot.lower.copy(), robot.upper.copy()
     combined = np.array([limit.factors for limit in robot.combined]).reshape(-1, drive.shape[1])
     sums = np.array([[limit.lower, limit.upper] for limit in robot.combined]).reshape(-1, 2).T.copy()

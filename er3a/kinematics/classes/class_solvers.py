@@ -51,14 +51,12 @@ class ArmClassTraits:
 
     Attributes
     ----------
-    closed_form : whether its solutions come without elimination or search
-    eliminates : whether they come by elimination, where rounding may lose some
+    closed_form : whether its solutions come without elimination, where rounding may lose some, and without search
     searched : whether a pose in doubt is searched for self-motions from many starts
     task : which of x, y, z and the rotations about x, y, z of the tool's frame its solutions meet
     """
 
     closed_form: bool = False
-    eliminates: bool = False
     searched: bool = False
     task: tuple[int, int, int, int, int, int] = (1, 1, 1, 1, 1, 1)
 
@@ -68,14 +66,14 @@ ARM_CLASSES: dict[ArmClassCode, ArmClassTraits] = {
     "three_parallel": ArmClassTraits(closed_form=True),
     "arm_angle": ArmClassTraits(closed_form=True),
     "gantry": ArmClassTraits(closed_form=True, searched=True),
-    "general_six": ArmClassTraits(eliminates=True, searched=True),
-    "six_two_prismatic": ArmClassTraits(eliminates=True, searched=True),
-    "six_one_prismatic": ArmClassTraits(eliminates=True, searched=True),
+    "general_six": ArmClassTraits(searched=True),
+    "six_two_prismatic": ArmClassTraits(searched=True),
+    "six_one_prismatic": ArmClassTraits(searched=True),
     "scara": ArmClassTraits(closed_form=True, searched=True, task=(1, 1, 1, 0, 0, 1)),
-    "redundant": ArmClassTraits(eliminates=True),
-    "free_roll": ArmClassTraits(eliminates=True, searched=True, task=(1, 1, 1, 1, 1, 0)),
-    "planar_wrist": ArmClassTraits(eliminates=True, searched=True),
-    "position": ArmClassTraits(eliminates=True, searched=True, task=(1, 1, 1, 0, 0, 0)),
+    "redundant": ArmClassTraits(),
+    "free_roll": ArmClassTraits(searched=True, task=(1, 1, 1, 1, 1, 0)),
+    "planar_wrist": ArmClassTraits(searched=True),
+    "position": ArmClassTraits(searched=True, task=(1, 1, 1, 0, 0, 0)),
     "dependent": ArmClassTraits(),
     "unsolved": ArmClassTraits(),
 }
@@ -543,11 +541,9 @@ class PaddedChain(ChainSolver):
             x[np.abs(wrap_to_pi(x[:, :, list(self.lacking)])).max(axis=2) > LEFT_OVER] = np.nan
         x = np.delete(x, self.lacking, axis=2)
         for first in range(x.shape[1]):  # rows that differ in the joints that are not there
-            same = np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
-            x[:, first + 1 :][same] = np.nan
-            meet = (
-                np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
-            )
+            away = np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0)
+            x[:, first + 1 :][away < 1e-9] = np.nan
+            meet = (away >= 1e-9) & (away < DOUBLE_ROOT)
             certainty = np.where(meet.any(axis=1), CONTINUUM, certainty)
         return x, certainty
 

@@ -26,7 +26,7 @@ from er3a.kinematics.chain import axes_of, meeting_point, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import SphericalConstants, spherical_constants
 from er3a.kinematics.classes.scara import wrist_angles
 from er3a.kinematics.classes.six_revolute import CERTAIN, SLOTS, UNCERTAIN, RowsFound, in_order
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Reals, zeros_of
 
 MEETS = 1e-9  # of the size, by which axes miss the wrist centre; sine between neighbouring axes of the wrist
 PARALLEL = 1e-11  # of the lines' coefficients, by which they are parallel for all d
@@ -244,10 +244,7 @@ def _slides(lines: Reals, n: Reals) -> tuple[Reals, Flags]:
         degree[np.abs(polynomial[:, k]) > PARALLEL * size] = k
     for own in np.unique(degree[degree > 0]).tolist():
         at = degree == own
-        companion = np.zeros((int(at.sum()), own, own))
-        companion[:, np.arange(1, own), np.arange(own - 1)] = 1.0
-        companion[:, :, -1] = -polynomial[at, :own] / polynomial[at, own, None]
-        roots = np.linalg.eigvals(companion)
+        roots = zeros_of(polynomial[at, : own + 1])
         d[at, :own] = np.where(np.abs(roots.imag) < NEARLY_REAL * (1 + np.abs(roots)), roots.real, np.nan)
     return d, size < PARALLEL
 

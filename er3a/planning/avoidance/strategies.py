@@ -125,11 +125,7 @@ class BentPath:
         progress = np.asarray(progress, float)
         T = self.path.poses(progress)
         for bend in self.bends:
-            size = bend.size(progress)[..., None]
-            T[..., :3, 3] += size * bend.shift
-            if bend.tilt.any():
-                turns = scipy.spatial.transform.Rotation.from_rotvec((size * bend.tilt).reshape(-1, 3)).as_matrix()
-                T[..., :3, :3] = turns.reshape(*progress.shape, 3, 3) @ T[..., :3, :3]
+            T = moved(T, bend.size(progress)[..., None] * np.append(bend.shift, bend.tilt))
         return T
 
 
