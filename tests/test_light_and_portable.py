@@ -119,11 +119,11 @@ def test_only_libraries_of_extras_are_named_as_such():
 
 
 def test_help_and_commands_say_the_same():
-    for name, (room, _, line) in COMMANDS.items():
+    for name, (room, panel, line) in COMMANDS.items():
         import_module(f"er3a.pipeline.commands.{room}")
         command = typer.main.get_group(app).commands[name]
         said = " ".join((command.help or "").split("\n\n")[0].split())
-        assert said == line
+        assert (command.rich_help_panel, said) == (panel, line)  # type: ignore[attr-defined]
 
 
 def test_help_loads_no_numerics():

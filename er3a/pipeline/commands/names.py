@@ -69,10 +69,10 @@ class CommandsByName(TyperGroup):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        shown = {
-            name: TyperCommand(name, help=line, rich_help_panel=panel) for name, (_, panel, line) in COMMANDS.items()
-        }
+        shown = {name: TyperCommand(name, help=line) for name, (*_, line) in COMMANDS.items()}
         self.commands = {**shown, **self.commands}
+        for name, (_, panel, _) in COMMANDS.items():
+            vars(self.commands[name]).update(rich_help_panel=panel)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first word names, its module imported now.
