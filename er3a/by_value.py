@@ -1,9 +1,9 @@
 """Frozen dataclasses as values: equal if all fields are equal, and safe to pickle, copy and send to another process.
 
 The methods of ``@dataclass`` compare arrays with ``==``, which is ambiguous, treat NaN as unequal to itself, and can't
-hash arrays. Classes based on this module are declared with ``eq=False`` instead::
+hash arrays. A class that holds arrays is :class:`ByValue`, or :func:`by_identity` where nothing compares it::
 
-    @dataclass(frozen=True, eq=False)
+    @frozen
     class Ray(ByValue):
         origin: Reals
         direction: Reals
@@ -18,12 +18,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
 from html import escape
 from itertools import islice
 from types import MethodType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
@@ -60,6 +60,52 @@ class ByValue:
         arrays = {name: value for name, value in held.items() if isinstance(value, np.ndarray)}
         read_only = [name for name, array in arrays.items() if not array.flags.writeable]
         return _restored, (kind, held, read_only)
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def frozen(kind: type[Held]) -> type[Held]:
+    """Make a frozen dataclass, which keeps how its base compares (:class:`ByValue`) and prints (:class:`Displayed`).
+
+    Parameters
+    ----------
+    kind : the class, of annotated fields
+
+    Returns
+    -------
+    kind : the same class; without these bases it compares and prints as dataclasses do
+    """
+    return dataclass(frozen=True, eq=not issubclass(kind, ByValue), repr=not issubclass(kind, Displayed))(kind)
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def slotted(kind: type[Held]) -> type[Held]:
+    """Make a frozen dataclass as :func:`frozen` does, with slots: for what there are many thousands of.
+
+    Parameters
+    ----------
+    kind : the class, of annotated fields
+
+    Returns
+    -------
+    kind : a new class, because slots can't be added to one
+    """
+    own = not issubclass(kind, ByValue), not issubclass(kind, Displayed)
+    return dataclass(frozen=True, slots=True, eq=own[0], repr=own[1])(kind)
+
+
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
+def by_identity(kind: type[Held]) -> type[Held]:
+    """Make a frozen dataclass that is equal to itself alone: for what holds arrays and is never compared.
+
+    Parameters
+    ----------
+    kind : the class, of annotated fields
+
+    Returns
+    -------
+    kind : the same class
+    """
+    return dataclass(frozen=True, eq=False)(kind)
 
 
 class ReadOnly(Mapping[Key, Held]):

@@ -8,17 +8,17 @@ What lists findings adds their places and levels. Code decides by code, basis an
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import field, fields, is_dataclass, replace
 from typing import Any, Literal, TypeGuard
 
 import numpy as np
 
-from er3a.by_value import ReadOnly, crude_hash
+from er3a.by_value import ReadOnly, crude_hash, slotted
 
 Basis = Literal["documented", "assumed"]
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Amount:
     """A number with its unit.
 
@@ -35,7 +35,7 @@ class Amount:
         return f"{self.value:.6g} {self.unit}".rstrip()
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Finding:
     """Something that was found.
 

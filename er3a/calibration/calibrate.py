@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, by_identity, frozen, shortly
 from er3a.calibration.clustered import clustered_covariance
 from er3a.calibration.cross_validation import (
     ChosenTerms,
@@ -85,7 +85,7 @@ FEW_SPARE = 10
 """Degrees of freedom below which what remains says how large noise is, but not where; at least as many as numbers."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Level:
     """The entries that are estimated.
 
@@ -201,7 +201,7 @@ def _what_touches(settled: int, best: int, observations: PointObservations) -> F
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class Estimate:
     """One estimated number, in mm or deg.
 
@@ -235,7 +235,7 @@ class Estimate:
         return self.quantile * self.standard_error
 
 
-@dataclass(frozen=True)
+@frozen
 class Outlier:
     """A measurement that was set aside: its line in the file, and how far it is from the model that the others fit."""
 
@@ -256,7 +256,7 @@ class TermEstimate(JointTerm):
     standard_errors: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Beyond(CorrectedModel):
     """A model with errors of joints that no table holds, fitted together with a table of its own.
 
@@ -276,7 +276,7 @@ class Beyond(CorrectedModel):
     left_out: HeldOutErrors | None
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Calibration(ByValue, Displayed):
     """A table's corrections.
 
@@ -559,7 +559,7 @@ def _fitted(robot: Robot, level: Level, observations: PointObservations) -> Fit:
         raise CalibrationError(level.more, problem) from None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Model:
     """Points that are used, the table with what a robot file can hold, and with all terms that are chosen (the same if
     there are none), which has observations of its own deviation."""

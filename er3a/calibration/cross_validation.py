@@ -21,6 +21,7 @@ import scipy
 import scipy.sparse
 from scipy.cluster.vq import kmeans, vq
 
+from er3a.by_value import by_identity, frozen
 from er3a.calibration.fit import ROUNDING, Fit, jacobian
 from er3a.calibration.observations import PointObservations
 from er3a.calibration.parameters import DEPENDENT
@@ -55,7 +56,7 @@ MIN_SPARE = 3
 RIDGE = 1e-12  # of columns of unit length, so that dependent ones can be solved for
 
 
-@dataclass(frozen=True)
+@frozen
 class HeldOutErrors:
     """Distances between model and measurement at poses that were left out, mm.
 
@@ -176,7 +177,7 @@ def parts_of(observations: PointObservations, seed: int) -> tuple[Integers, Inte
     return random, vq(scaled, centres)[0].astype(np.int64)[pose]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ChosenTerms:
     """Terms that lower the error at poses left out, all that were tried, and that error without them."""
 

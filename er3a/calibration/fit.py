@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.calibration.observations import PointObservations
 from er3a.calibration.parameters import (
     DEPENDENT,
@@ -58,7 +59,7 @@ TURNS_ALL = Entry("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Subspace:
     """What measurements determine.
 
@@ -240,7 +241,7 @@ def _confounded_with(robot: Robot, parameters: Sequence[Entry], k: int, kept: li
     )
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Fit:
     """A least squares' solution.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse
 from scipy.spatial import cKDTree
 
+from er3a.by_value import by_identity, frozen
 from er3a.calibration.parameters import PARALLEL_RAD, FixedName, PlacementName, placements_of
 from er3a.comparison.entries import Entry
 from er3a.errors import InputError
@@ -34,7 +35,7 @@ UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
 """How many numbers of each coordinate drop out, because nobody knows where a thing is."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Measurement:
     """Where a point was seen.
 
@@ -65,7 +66,7 @@ class Measurement:
         return ("place", self.place) if self.place else ("plane", self.plane) if self.plane else None
 
 
-@dataclass(frozen=True)
+@frozen
 class Touched:
     """A place or plane.
 
@@ -88,7 +89,7 @@ class Touched:
         return self.coordinates * max(self.poses - self.unknown, 0)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PointObservations:
     """Measured coordinates of points that the flange carries, and orientations.
 

@@ -215,7 +215,7 @@ def coupled(robot: Robot, errors: Mapping[tuple[int, int], float]) -> Robot:
     factors = np.eye(robot.rows)
     for (row, other), error in errors.items():
         factors[row - 1, other - 1] += error
-    return robot.replace(coupling=factors if robot.coupling is None else factors @ robot.coupling) if errors else robot
+    return robot.replace(coupling=factors @ robot.joint_to_row) if errors else robot
 
 
 def corrected(robot: Robot, parameters: Sequence[Entry], amounts: Reals) -> Robot:

@@ -13,13 +13,12 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.calibration.observations import Measurement, PointObservations, observed
 from er3a.comparison.entries import row_twists
 from er3a.kinematics.chain import row_values
@@ -44,7 +43,7 @@ TAKEN = 0.1
 """The same of terms that were taken: it holds what measurements leave open, and doesn't pull at what they settle."""
 
 
-@dataclass(frozen=True)
+@frozen
 class JointTerm:
     """One kind of error of the joint of one row, from 1; ``turns``: how often a ripple returns in a turn; ``by``: the
     row that it is coupled to."""
@@ -131,7 +130,7 @@ def starting_table(robot: Robot) -> dict[str, Any]:
     return {
         "convention": robot.convention,
         **{name: getattr(robot, name).tolist() for name in names},
-        "coupling": (np.eye(robot.rows) if robot.coupling is None else robot.coupling).tolist(),
+        "coupling": robot.joint_to_row.tolist(),
     }
 
 
@@ -152,7 +151,7 @@ def effects(robot: Robot, row_values: Reals, points: Reals) -> Reals:
     return row_twists(tables_of(robot), robot, row_values, xyz)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointErrors(ByValue):
     """Terms with their coefficients.
 
@@ -200,7 +199,7 @@ class JointErrors(ByValue):
         return found
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class CorrectedModel(ByValue):
     """A corrected arm with errors of joints that no table holds.
 

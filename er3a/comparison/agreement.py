@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
+from er3a.by_value import frozen
 from er3a.comparison.compare import Comparison, compare
 from er3a.robots.robot import Robot
 
@@ -13,7 +13,7 @@ LAYERS = "units", "geometry", "zero", "directions", "base", "flange", "coupling"
 Pairs = Mapping[tuple[str, str], Comparison]
 
 
-@dataclass(frozen=True)
+@frozen
 class Agreement:
     """Of one layer, the sources that agree with each other, the largest group first.
 

@@ -16,10 +16,10 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import rot_y
 from er3a.numerics.arrays import Reals
 
@@ -30,7 +30,7 @@ TIE = 1e-9
 """Directions that differ by less are equally near: rounding must not choose between two tables."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class AxisTable:
     """A standard table with ``theta = direction * q + offset`` and the transforms before and after it.
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations, product
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Flags
 from er3a.robots.robot import Robot
@@ -38,7 +39,7 @@ EXCHANGED = SHAPE, (*SHAPE, "offset"), LIMITS
 SHIFTED = ("offset",), SHAPE, ("a", "alpha"), ("d",), ("a",), ("alpha",)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Slip:
     """A slip of a pen.
 

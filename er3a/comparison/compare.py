@@ -11,14 +11,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any, Literal, get_args
 
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, frozen
 from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import SIDES, Cause, CauseCode, Explained, explain
@@ -74,7 +74,7 @@ TINY = 0.01  # m, of all lengths of two arms that are both in another unit
 FINEST = 5e-3  # by which part of all its lengths such an arm may differ
 
 
-@dataclass(frozen=True)
+@frozen
 class Difference:
     """An entry of the table that the other arm has otherwise.
 
@@ -90,7 +90,7 @@ class Difference:
     alike: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class UnitLayer:
     """``causes``: columns in another unit than they were read in, and what takes their values to it."""
 
@@ -98,7 +98,7 @@ class UnitLayer:
     causes: tuple[Cause, ...] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class GeometryLayer:
     """``worst_mm`` and ``worst_deg``: the largest gap of all ``invariants`` that were compared.
 
@@ -113,7 +113,7 @@ class GeometryLayer:
     unexplained_mm: float = 0.0
 
 
-@dataclass(frozen=True)
+@frozen
 class ZeroLayer:
     """By row what B's offset is more than A's (deg; mm of joints that slide); 0 of the first and the last row, whose
     zeros can't be distinguished from base and flange."""
@@ -122,7 +122,7 @@ class ZeroLayer:
     offsets_deg: tuple[float, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class DirectionLayer:
     """Numbers of the rows that B moves the other way."""
 
@@ -130,7 +130,7 @@ class DirectionLayer:
     reversed: tuple[int, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class Turn:
     """A turn by ``deg`` about a unit ``axis``."""
 
@@ -138,7 +138,7 @@ class Turn:
     axis: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
+@frozen
 class PlacementLayer:
     """Pose of B's base (flange) in A's base (flange) frame once joint axes agree.
 
@@ -151,7 +151,7 @@ class PlacementLayer:
     entries: tuple[Difference, ...] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class RangeDifference:
     """A limit or speed of a joint: ``a``, and ``b`` in A's zero and direction; None for a joint without limits."""
 
@@ -162,7 +162,7 @@ class RangeDifference:
     unit: str
 
 
-@dataclass(frozen=True)
+@frozen
 class RangeLayer:
     """Limits or speeds; ``same`` is None where one side gives none, or nothing differs but some are not given."""
 
@@ -170,7 +170,7 @@ class RangeLayer:
     differences: tuple[RangeDifference, ...] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class CouplingLayer:
     """Couplings: what rows move by; ``rows`` are those that B couples otherwise."""
 
@@ -178,7 +178,7 @@ class CouplingLayer:
     rows: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Alignment(ByValue):
     """What brings B's flange nearest to A's: ``base`` and ``flange`` (4, 4), m, as in :class:`mechanism.Match`, and of
     each row ``zeros`` (m,), rad or m, and ``signs`` (m,), +1 or -1."""
@@ -189,7 +189,7 @@ class Alignment(ByValue):
     signs: Reals
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Comparison(ByValue, Displayed):
     """What :func:`compare` found.
 
@@ -449,11 +449,7 @@ def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.
 def _joints_paired(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> tuple[Reals, CouplingLayer]:
     """+1 or -1 for each joint (n,), -1 where B's pendant counts in the other direction, and whether couplings agree."""
     rows = np.where(found.reverses, -1.0, 1.0)
-    if robot_a.coupling is None and robot_b.coupling is None:
-        return rows, CouplingLayer(True)
-    own, other = (
-        np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling for robot in (robot_a, robot_b)
-    )
+    own, other = robot_a.joint_to_row, robot_b.joint_to_row
     turned = rows[:, None] * other  # what A's rows would move by for B's joints
     with_same, with_other = np.abs(turned - own).sum(axis=0), np.abs(turned + own).sum(axis=0)
     signs = np.where(with_other < with_same, -1.0, 1.0)

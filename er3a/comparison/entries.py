@@ -4,11 +4,12 @@ calibration and evidence name and change."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.geometry.transforms import rot_x, rot_z, translation
 from er3a.kinematics.table_batch import Tables, frames_of
 from er3a.numerics.arrays import Reals
@@ -25,7 +26,7 @@ SCALE_M, SCALE_RAD = 1e-3, float(np.radians(0.1))  # 0.1 deg moves a point 0.6 m
 """Steps of lengths and angles that move a tool about as far: 1 mm, and 0.1 deg at half a metre."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Entry:
     """One number of a table, of its base or its tool.
 

@@ -30,11 +30,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, rotation_angle, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -57,7 +58,7 @@ MAX_HALF_TURN = math.radians(185.0)
 TOLERANCE_MM, TOLERANCE_DEG = 0.5, 0.1  # lengths and angles that differ by at most this are equal, unless asked for
 
 
-@dataclass(frozen=True)
+@frozen
 class Tolerances:
     """By how much entries may differ and still agree: m and rad."""
 
@@ -79,7 +80,7 @@ class Tolerances:
         return np.asarray(np.abs(zeros) > np.where(sliding, self.length, self.angle))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Mechanism:
     """A table in standard form: ``base Rz(theta_1) L_1 ... Rz(theta_m) flange``, theta = direction * u + offset.
 
@@ -267,7 +268,7 @@ def with_senses(mechanism: Mechanism, senses: Reals, normals: Reals) -> Mechanis
 # Senses of axes and normals -------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Scores:
     """What each of the S senses of axes leaves different.
 
@@ -400,7 +401,7 @@ def parallel_blocks(mechanism: Mechanism, parallel: Flags) -> list[tuple[int, in
 # The match ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@frozen
 class EntryDifference:
     """An entry of the first table that the other arm has otherwise: m or rad.
 
@@ -421,7 +422,7 @@ class EntryDifference:
         return abs(gap if self.column in ("a", "d") else float(wrap_to_pi(np.array(gap))))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Match:
     """The other arm brought onto the first one.
 

@@ -15,11 +15,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.comparison import mechanism
 from er3a.comparison.changes import Change, Slip, SlipCode, changed, slips_of, times
 from er3a.geometry.vectors import wrap_to_pi
@@ -35,7 +36,7 @@ FAR = 4.0
 UPRIGHT = 1 - 1e-6
 
 
-@dataclass(frozen=True)
+@frozen
 class Cause:
     """A slip that made entries differ.
 
@@ -55,14 +56,14 @@ class Cause:
     alike: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Edit:
     slip: Cause
     price: float
     undone: Change
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Explained:
     """Both arms with the ``slips`` undone, and how they match then."""
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.by_value import ByValue, Displayed, Sheet, frozen
 from er3a.calibration.parameters import placements_of
 from er3a.comparison.entries import Entry
 from er3a.confirmation.fit import Fitter, Place, Solution
@@ -49,7 +48,7 @@ FOLDS, HELD_OUT = 5, 8
 DIGIT_M, DIGIT_RAD = 1e-9, 1e-9  # of poses that are given as arrays
 
 
-@dataclass(frozen=True)
+@frozen
 class FoundEntry:
     """An entry of the table that is other: mm or deg, with half its 95 % interval."""
 
@@ -62,7 +61,7 @@ class FoundEntry:
 UPRIGHT_DEG = 90.0
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Placed(ByValue):
     """Base or tool of the controller, (4, 4), m, with half of its 95 % intervals, mm and deg."""
 
@@ -84,7 +83,7 @@ class Placed(ByValue):
         return np.array([roll, pitch, yaw])
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Confirmation(ByValue, Displayed):
     """Whether a model agrees with its controller, and what is between them.
 
@@ -318,8 +317,7 @@ def _corrected(robot: Robot, solution: Solution, count: int) -> Robot:
             ends = np.sort(np.stack([sign * (robot.lower - shift), sign * (robot.upper - shift)]), axis=0)
             found = found.replace(direction=found.direction * sign, lower=ends[0], upper=ends[1])
         else:
-            own = np.eye(robot.joints) if robot.coupling is None else robot.coupling
-            found = found.replace(coupling=own @ factors)
+            found = found.replace(coupling=robot.joint_to_row @ factors)
     if not (solution.entries or solution.explanation.free or solution.explanation.joints.faults):
         return found
     source = Source(f"Fitted to {count} poses of the controller, starting from {robot.name}", "inferred")

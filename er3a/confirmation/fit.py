@@ -12,11 +12,12 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.calibration.fit import jacobian
 from er3a.calibration.observations import PointObservations
 from er3a.calibration.parameters import corrected, parameters_of, placements_of
@@ -41,7 +42,7 @@ BIG = 3.0  # of these, beyond which a correction is no small one
 SINGULAR = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class JointReading:
     """How the model's joints follow from the pendant's: ``q = factors @ p + shift``.
 
@@ -65,7 +66,7 @@ class JointReading:
         return q @ self.factors.T + self.shift
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Explanation:
     """What could be between a model and its controller.
 
@@ -85,7 +86,7 @@ class Explanation:
     small: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class State:
     """An explanation with values.
 
@@ -130,7 +131,7 @@ class State:
         return found
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Solution(State):
     """An explanation with the values that fit best.
 
@@ -341,8 +342,7 @@ class Fitter:
     def _whitening(self, state: State) -> Reals:
         """(N, 6, 6), which make standard deviations of differences; rows of 0 for orientations that are not given."""
         robot, pairs, seen = self.robot, self.pairs, state.seen
-        coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        by_joint = coupling @ state.explanation.joints.factors
+        by_joint = robot.joint_to_row @ state.explanation.joints.factors
         J = effects(state.arm, seen.row_values, seen.points(state.arm)) @ by_joint
         J *= (pairs.q_digit * ROUNDED)[:, None]
         turned = np.repeat(pairs.turn_digit, 3, axis=1)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.numerics.arrays import Flags, Integers, Reals
 
 ROUNDED = 12**-0.5  # standard deviation of rounding, in last digits
@@ -23,7 +23,7 @@ def spread(count: int, most: int) -> Integers:
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).astype(np.int64))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Pairs(ByValue):
     """N poses of a controller.
 

@@ -10,11 +10,9 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.collision.along import clearance
 from er3a.confirmation.fit import SMALL, Explanation, Fitter
 from er3a.confirmation.pairs import Pairs
@@ -35,7 +33,7 @@ CLEAR_M, FLOOR_M = 0.03, 0.05  # of the arm from itself, and of its joints and t
 DIGIT_M, DIGIT_DEG = 1e-5, 0.01
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Plan(ByValue):
     """Poses to read at the pendant.
 

@@ -15,11 +15,11 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.confirmation.fit import Fitter, JointReading
 from er3a.confirmation.pairs import Pairs
 from er3a.finding import Finding, fact
@@ -32,7 +32,7 @@ BLOCK = 1_000
 LEAST_M, LEAST_RAD = 2e-4, 2e-4  # m and rad: within digits, so that none is preferred for less
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Near:
     """A way of reading, with the frames that bring it near.
 

@@ -12,11 +12,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.comparison.axis_table import table_from_axes
 from er3a.comparison.compare import rows_at_ends
 from er3a.comparison.entries import Entry, shifted
@@ -68,7 +68,7 @@ PARALLEL = 1 - 1e-6
 SIGNS: tuple[Literal[1, -1], ...] = (-1, 1)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Conventions:
     """A table's geometry is the references', but for few entries; ``faults`` is what is wrong or defined otherwise,
     ``corrected`` the table with it as they have it."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, frozen, shortly
 from er3a.diagnosis.defined_otherwise import conventions_of, counted_from_ground
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.diagnosis.fitting import MEETS
@@ -30,7 +29,7 @@ from er3a.robots.robot import Robot
 MOSTLY = 0.05
 
 
-@dataclass(frozen=True)
+@frozen
 class RankedHypothesis:
     """A fault or two that would explain the disagreement.
 
@@ -57,7 +56,7 @@ class RankedHypothesis:
     score: float
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Hypothesis(ByValue, Displayed, RankedHypothesis):
     """A fault or two that would explain the disagreement, and ``corrected``, the robot without the faults."""
 

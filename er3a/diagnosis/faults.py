@@ -5,10 +5,10 @@ with a free number are in :mod:`er3a.diagnosis.fitting`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.comparison.changes import SHAPE, Change, Slip, slips_of, swapped, times
 from er3a.comparison.entries import LENGTHS, Entry
 from er3a.finding import Finding, fact, is_one
@@ -107,7 +107,7 @@ SAME = 1e-12
 DECIMALS = 9
 
 
-@dataclass(frozen=True)
+@frozen
 class Repair:
     """A change without free number.
 

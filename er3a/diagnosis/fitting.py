@@ -14,12 +14,12 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
+from er3a.by_value import by_identity, frozen
 from er3a.comparison.entries import LENGTHS, Entry, entries_in, shifted
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -75,7 +75,7 @@ Residual = Callable[[Tables], Reals]
 """Tables to residuals (H, n) in half-widths."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Fits:
     """Free numbers with values.
 
@@ -126,7 +126,7 @@ class Fits:
         return greatest
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Search:
     """What is fitted: start tables, the free numbers, and residuals of tables."""
 
@@ -297,7 +297,7 @@ def _solved(slopes: Reals, left: Reals, damping: Reals, floor: float) -> Reals:
     return np.linalg.solve(unit, aim[:, :, None])[:, :, 0] / scale
 
 
-@dataclass(frozen=True)
+@frozen
 class ScanGrid:
     """How finely to look.
 

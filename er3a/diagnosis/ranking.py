@@ -21,13 +21,14 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import by_identity
 from er3a.comparison.entries import Entry
 from er3a.diagnosis import fitting
 from er3a.diagnosis.faults import SIDES, Fault, Faults, Repair, entry_of, place_of, repairs_of, rounded, wrong_number
@@ -52,7 +53,7 @@ NEARLY = 2.0  # half-widths, that a pair is off on average which may meet all re
 Difference = Callable[[Tables], Reals]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Pool:
     """Evaluated hypotheses.
 
@@ -89,7 +90,7 @@ class Pool:
         return met
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Case:
     """A table and what it is held against.
 
@@ -338,7 +339,7 @@ def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, .
     return tuple(reference for i, reference in enumerate(resting) if i not in contradicted)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Ranking:
     """Hypotheses in order, gathered into sets between which no reference decides.
 

@@ -17,13 +17,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError, RobotError
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
@@ -64,7 +64,7 @@ PROBLEMS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ArmModel:
     """An arm with its load, ready for batches. Joint values, velocities and accelerations are (N, n), contiguous.
 
@@ -209,8 +209,7 @@ def arm_model(robot: Robot, load: Load | None = None, gravity: float = GRAVITY) 
             raise RobotError(robot.name, f"{named} {PROBLEMS[problem]}")
         inertia = pin.Inertia(body.mass, np.array(body.centre), body.inertia_matrix)
         model.appendBodyToJoint(robot.rows if link is None else link, inertia, pin.SE3.Identity())
-    coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-    return ArmModel(robot, load, model, robot.direction[:, None] * coupling, tuple(bodies))
+    return ArmModel(robot, load, model, robot.direction[:, None] * robot.joint_to_row, tuple(bodies))
 
 
 def flange_in_last_link(robot: Robot) -> Reals:
@@ -248,7 +247,7 @@ AROUND = STEPS[np.abs(STEPS).sum(axis=1) > 0] / np.linalg.norm(STEPS[np.abs(STEP
 """26 directions: a ball by their points is too small by 8 % of its radius at most."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LinkShape:
     """The shape of a link in the frame that moves with its joint.
 
@@ -343,7 +342,7 @@ def _outline(part: Envelope | Reals) -> Reals:
 
 
 def filled(points: Reals, density: float = WATER) -> MassBody:
-    """The hull of points, filled with a material, as tetrahedra about its middle [4]_.
+    """The hull of points, filled with a material.
 
     Parameters
     ----------
@@ -353,21 +352,12 @@ def filled(points: Reals, density: float = WATER) -> MassBody:
     Returns
     -------
     body : in the frame of the points, inertia about its own centre
-
-    References
-    ----------
-    .. [4] F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", J. Math. Stat. 1 (2005).
     """
-    hull, middle = scipy.spatial.ConvexHull(points), points.mean(axis=0)
-    corners = points[hull.simplices] - middle
-    mass = density * np.abs(np.linalg.det(corners)) / 6
-    sums = corners.sum(axis=1)
-    second = np.einsum("t,ti,tj->ij", mass, sums, sums) + np.einsum("t,tki,tkj->ij", mass, corners, corners)
-    whole, centre = float(mass.sum()), mass @ sums / 4 / mass.sum()
-    # Second moments about the middle, then about the centre of mass.
-    second = second / 20 - whole * np.outer(centre, centre)
-    x, y, z = (middle + centre).tolist()
-    return MassBody(whole, (x, y, z), six_moments(np.trace(second) * np.eye(3) - second))
+    from trimesh.convex import convex_hull  # takes a while
+
+    found = convex_hull(points).mass_properties
+    x, y, z = found.center_mass.tolist()
+    return MassBody(density * float(found.mass), (x, y, z), six_moments(density * found.inertia))
 
 
 def capsule_body(capsule: Envelope, density: float) -> MassBody:

@@ -24,11 +24,11 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.dynamics.arm_model import PARAMETERS, ArmModel
 from er3a.dynamics.torques import time_mean
 from er3a.dynamics.worst_poses import max_over_poses
@@ -44,7 +44,7 @@ REAL = 1e-7
 whether the polynomial rises at it is asked so far beyond."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class DriveLimits:
     """Peak torques, RMS ones over a cycle, and joint speeds: (n,) each, NaN where unknown."""
 
@@ -58,7 +58,7 @@ class DriveLimits:
         return bool(np.isfinite([self.peak, self.rated]).any())
 
 
-@dataclass(frozen=True)
+@frozen
 class Margin:
     """The largest value, and what binds; None where nothing does.
 
@@ -166,7 +166,7 @@ AXES = np.eye(3)
 UPPER = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
-@dataclass(frozen=True)
+@frozen
 class MassTolerance:
     """By how much a grade's masses (as a ratio) and centres of mass (m) are taken to be off at most."""
 
@@ -290,7 +290,7 @@ def tolerances_of(body: MassBody, grade: Grade) -> tuple[float, float]:
 WristQuantity = Literal["payload", "moment", "inertia"]
 
 
-@dataclass(frozen=True)
+@frozen
 class WristUse:
     """What a load requires, against what is allowed: kg, N m or kg m^2; ``joint`` from 1, None for the payload.
 

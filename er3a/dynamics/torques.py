@@ -6,11 +6,10 @@ must give. N m for revolute joints, N for prismatic ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of
 from er3a.dynamics.worst_poses import Maxima, max_over_poses
 from er3a.errors import ShapeError
@@ -23,7 +22,7 @@ AT_REST = 1e-5
 """rad/s or m/s: joints slower than that are at rest but for rounding."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class TorqueParts:
     """Torques (N, n) by their cause; unknown friction and rotor inertia count nothing.
 
@@ -222,7 +221,7 @@ def _flat(robot: Robot, named: dict[str, Reals]) -> tuple[list[Reals], tuple[int
 POWER_STEP = 2e-5  # s
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Demand:
     """Of each joint (n,), over a motion; N m, W, J, rad/s (N, m/s for prismatic joints).
 

@@ -13,6 +13,7 @@ from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 Vector = tuple[float, float, float]
+Rows = tuple[Vector, Vector, Vector]
 
 
 @inner_kernel
@@ -109,6 +110,22 @@ def in_frame_of(T: Reals, v: Vector) -> Vector:
         T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2],
         T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2],
     )
+
+
+@inner_kernel
+def turned_by(rows: Rows, v: Vector) -> Vector:
+    """A vector turned by a rotation that is given as three rows.
+
+    Parameters
+    ----------
+    rows : directions of the new frame in the old one
+    v : components in the old frame
+
+    Returns
+    -------
+    components : three numbers, in the new frame
+    """
+    return dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)
 
 
 @inner_kernel
@@ -210,13 +227,12 @@ def wrap_to_pi(angle: Reals) -> Reals:
     return angle - TURN * np.ceil((angle - np.pi) / TURN)
 
 
-def fibonacci_sphere(count: int, turned_back: bool = False) -> Reals:
+def fibonacci_sphere(count: int) -> Reals:
     """Nearly even unit vectors on the sphere, each for the same area (Fibonacci lattice) [2]_.
 
     Parameters
     ----------
     count : how many
-    turned_back : the same lattice, mirrored at y = 0
 
     Returns
     -------
@@ -229,6 +245,6 @@ def fibonacci_sphere(count: int, turned_back: bool = False) -> Reals:
     """
     n = np.arange(count)
     z = 1 - (2 * n + 1) / count
-    azimuth = n * np.pi * (3 - np.sqrt(5)) if turned_back else 2 * np.pi * n * (2 / (1 + np.sqrt(5)))
+    azimuth = 2 * np.pi * n * (2 / (1 + np.sqrt(5)))
     flat = np.sqrt(1 - z * z)
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), z], axis=1)

@@ -11,12 +11,11 @@ They are not near the table, so linearisation can't find them: they and their co
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.comparison.changes import SIGNS, Slip, other_convention, slips_of, times
 from er3a.comparison.entries import Entry
 from er3a.geometry.vectors import wrap_to_pi
@@ -160,7 +159,7 @@ SAME_TOOL = 4.0  # mm, and thousandths: what moves a tool by less is none of ano
 MAX_COMPOSED = 2048
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Alternative(ByValue):
     """A table that differs by discrete changes.
 

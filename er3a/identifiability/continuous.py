@@ -11,12 +11,12 @@ its joint, changes rows but not the robot.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from math import isnan
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.comparison.entries import Entry, shifted, wrapped_between
 from er3a.identifiability.entries import Gauge
 from er3a.identifiability.entry_evidence import Tolerance
@@ -105,7 +105,7 @@ def _z_turned(tables: Tables, joint: int, row: int) -> Tables:
     return tables.with_column("alpha", [row, row + 1], tables.alpha[:, [row, row + 1]] + np.pi)
 
 
-@dataclass(frozen=True)
+@frozen
 class Extent:
     """What is left open for an entry, in its unit; NaN where no table was found that meets the evidence.
 

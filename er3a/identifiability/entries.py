@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.comparison.entries import Entry, entries_in, entry_twists
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
@@ -92,7 +92,7 @@ POSES = 32  # all over the joint range, at which the tool is looked at
 NOTHING = 1e-7  # of the largest singular value, below which a combination moves no tool
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Gauge:
     """What of k entries moves no tool.
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, get_args
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, frozen, shortly
 from er3a.comparison.entries import EntryUnit
 from er3a.identifiability.alternatives import Alternative
 from er3a.identifiability.entries import column_of
@@ -26,7 +25,7 @@ less is the business of a calibration and says nothing about the table."""
 NAMED = 6  # entries of a status in a line of a sheet
 
 
-@dataclass(frozen=True)
+@frozen
 class Tolerance:
     """How far the tool may be off for an entry that counts as settled, anywhere in the joint ranges."""
 
@@ -34,7 +33,7 @@ class Tolerance:
     deg: float = TOLERANCE_DEG
 
 
-@dataclass(frozen=True)
+@frozen
 class OtherReading:
     """A table that differs in a few entries, and that evidence allows.
 
@@ -50,7 +49,7 @@ class OtherReading:
     excluded_by: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class EntryEvidence:
     """What is known of an entry.
 
@@ -84,7 +83,7 @@ class EntryEvidence:
         return column_of(self.entry) not in ("lower", "upper", "speed")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class OtherTable(ByValue):
     """Another table (a batch of one): the one that evidence describes where it excludes the robot's, or one that it
     can't tell from the robot's, with all that is open at once."""
@@ -93,7 +92,7 @@ class OtherTable(ByValue):
     code: Literal["described", "allowed"]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Evidence(ByValue, Displayed):
     """What references say about a table.
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.comparison.entries import Entry, shifted
 from er3a.identifiability.entries import document_of, entries_of
 from er3a.identifiability.requirements import SoughtExtreme, along
@@ -25,7 +25,7 @@ REACTS_MM = 1e-4  # of an extreme, which is searched for
 CheckKind = Literal["independent", "consistency", "claim"]
 
 
-@dataclass(frozen=True)
+@frozen
 class CheckBasis:
     """What a check against a reference rests on.
 
@@ -44,7 +44,7 @@ class CheckBasis:
     same_publisher: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class CheckTally:
     """How many checks of one kind there are, and what became of them; ``conflicting``: missed, but contradicted by
     another reference that is met."""
@@ -59,7 +59,7 @@ class CheckTally:
         return self.passed + self.failed + self.conflicting
 
 
-@dataclass(frozen=True)
+@frozen
 class CheckCounts:
     """Checks against references by what they rest on."""
 

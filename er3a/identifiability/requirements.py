@@ -11,10 +11,10 @@ Of references that contradict each other, either may be right, so they require o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.kinematics.table_batch import Tables, frames_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.numerics.peaks import box_points, peak
@@ -98,7 +98,7 @@ def along(tables: Tables, extremes: Sequence[SoughtExtreme]) -> list[Reals]:
     return [sought.quantity.measure(T[:, k]) * quantities.MM for k, sought in enumerate(extremes)]
 
 
-@dataclass(frozen=True)
+@frozen
 class Requirement:
     """One required number.
 

@@ -5,10 +5,10 @@ text.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.comparison.compare import shift_between, turn_between, worst_poses
 from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
 from er3a.diagnosis.faults import SIDES, entry_of
@@ -180,7 +180,7 @@ SAME_MM, SAME_DEG = 1e-6, 1e-7
 SEEN_AT = 12  # joint vectors, at which the tools of tables are compared
 
 
-@dataclass(frozen=True)
+@frozen
 class ToolOff:
     """How far the tool is off at most: position and orientation, each at its own worst pose."""
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.transforms import MAX_DISTANCE_M, ORTHONORMAL_TOLERANCE
-from er3a.geometry.vectors import Vector
+from er3a.geometry.vectors import Rows, Vector, add, subtract, turned_by
 from er3a.kinematics.chain import rows_at
 from er3a.kinematics.classes.arm_angle import about_x, about_z
 from er3a.kinematics.forward import BLOCK, CONFIRMS, SCRATCH, cos_sin_rows, fill_start, turn_rows
@@ -43,7 +43,7 @@ class BlockConstants(NamedTuple):
     and the plane across axis 2; ``edges`` says whether the wrist's tilt ends before 0 and before pi.
     """
 
-    to_frame_1: tuple[Vector, Vector, Vector]
+    to_frame_1: Rows
     origin: Vector
     wrist_in_tool: Vector
     axis_6_in_tool: Vector
@@ -264,7 +264,7 @@ def fill_reference(q_ref: Reals, start: int, size: int, w: Reals) -> None:
 def _check(w: Reals) -> None:
     """1 where the pose is a rigid transform, to the tolerances of ``transforms.check_poses``."""
     for i in range(BLOCK):
-        a, b, c, x, d, e, f, y, g, h, k, z = rows_at(w, BLOCK, i)
+        ((a, b, c), (d, e, f), (g, h, k)), (x, y, z) = rows_at(w, BLOCK, i)
         first, second, third = a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + k * k - 1.0
         off_1, off_2, off_3 = a * d + b * e + c * f, a * g + b * h + c * k, d * g + e * h + f * k
         volume = a * (e * k - f * h) + b * (f * g - d * k) + c * (d * h - e * g)
@@ -330,40 +330,16 @@ def confirm_pair(chain: Chain, pair: Reals, shared: int, moved: Reals, w: Reals)
 
 
 @inner_kernel
-def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float) -> Vector:
-    """A vector turned by a rotation that is given as three rows. Kernel.
-
-    Parameters
-    ----------
-    rows : directions of frame 1 in the base frame
-    x, y, z : components in the base frame
-
-    Returns
-    -------
-    components : three numbers, in frame 1
-    """
-    a, b, c = rows
-    return a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z
-
-
-@inner_kernel
 def _shoulder(arm: BlockConstants, w: Reals, near: Reals, far: Reals) -> None:
     """Wrist centre and wrist axes in frame 1; both roots of theta_1."""
     for i in range(BLOCK):
-        t00, t01, t02, t03, t10, t11, t12, t13, t20, t21, t22, t23 = rows_at(w, BLOCK, i)
-        a, b, c = arm.wrist_in_tool
-        vx, vy, vz = in_frame_1(
-            arm.to_frame_1,
-            t00 * a + t01 * b + t02 * c + (t03 - arm.origin[0]),
-            t10 * a + t11 * b + t12 * c + (t13 - arm.origin[1]),
-            t20 * a + t21 * b + t22 * c + (t23 - arm.origin[2]),
-        )
-        a, b, c = arm.axis_6_in_tool
-        x, y, z = t00 * a + t01 * b + t02 * c, t10 * a + t11 * b + t12 * c, t20 * a + t21 * b + t22 * c
-        w[_Z6 * BLOCK + i], w[(_Z6 + 1) * BLOCK + i], w[(_Z6 + 2) * BLOCK + i] = in_frame_1(arm.to_frame_1, x, y, z)
-        a, b, c = arm.beside_6_in_tool
-        x, y, z = t00 * a + t01 * b + t02 * c, t10 * a + t11 * b + t12 * c, t20 * a + t21 * b + t22 * c
-        w[_X6 * BLOCK + i], w[(_X6 + 1) * BLOCK + i], w[(_X6 + 2) * BLOCK + i] = in_frame_1(arm.to_frame_1, x, y, z)
+        rows, position = rows_at(w, BLOCK, i)
+        beyond = subtract(position, arm.origin)
+        vx, vy, vz = turned_by(arm.to_frame_1, add(turned_by(rows, arm.wrist_in_tool), beyond))
+        z, x = turned_by(rows, arm.axis_6_in_tool), turned_by(rows, arm.beside_6_in_tool)
+        z, x = turned_by(arm.to_frame_1, z), turned_by(arm.to_frame_1, x)
+        for row in range(3):
+            w[(_Z6 + row) * BLOCK + i], w[(_X6 + row) * BLOCK + i] = z[row], x[row]
 
         # Turned by theta_1, the wrist centre must have the distance k across the arm's plane: two points of a circle.
         k = (arm.sideways - arm.cos_12 * vz) / arm.sin_12

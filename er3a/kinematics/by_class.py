@@ -9,12 +9,12 @@ which is traced and listed with its member nearest to the reference. Random star
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import frame_along, rotation_angle, transposed
 from er3a.kinematics.chain import constant_links, joint_starts, size_of
@@ -55,7 +55,7 @@ SCANNED = 16  # values of a redundancy parameter from which self-motions are col
 TRIED, CLOSER = 32, 3  # values that are tried where the one asked for has no rows; how often closer ones are
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ArmSolver:
     """An arm's chain of m rows as its solver takes it.
 
@@ -85,12 +85,12 @@ class ArmSolver:
         return PoseChain.of(links, self.sliding, T @ self.task_frame, self.size, TRACED.get(self.chain.code, POSE))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Settled:
     """Solutions of one pose: isolated ones, and self-motions, nearest to the reference first."""
 
     alone: Reals
-    motions: tuple[SelfMotionCurve, ...] = field(default=())
+    motions: tuple[SelfMotionCurve, ...] = ()
 
 
 @derived
@@ -205,7 +205,7 @@ def class_rows(robot: Robot, T: Reals, values: Reals) -> Reals:
     return to_joints(robot, arm_solver(robot).chain.rows(T, values)[0])
 
 
-def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, certainty: int) -> Settled:
+def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, certainty: int) -> Settled:
     """Solutions of one pose, divided into isolated ones and self-motions.
 
     Parameters
@@ -213,7 +213,6 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     T : (4, 4), m
     rows : (k, n), rad or m, what the class found, without NaN
     q_ref : (n,), rad or m
-    values : (1, k), of the redundancy parameters
     certainty : of the class at this pose
 
     Returns
@@ -282,7 +281,7 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
     grid = np.concatenate([values, _scanned(robot, SCANNED)])
     q = class_rows(robot, np.broadcast_to(T, (len(grid), 4, 4)), grid).reshape(-1, robot.joints)
     more = to_joints(robot, solver.poses_at(T).roots(_starts(robot, STARTS)))  # curves between the values scanned
-    return settle(robot, T, np.concatenate([q[np.isfinite(q[:, 0])], more]), q_ref, values, CERTAIN)
+    return settle(robot, T, np.concatenate([q[np.isfinite(q[:, 0])], more]), q_ref, CERTAIN)
 
 
 def _scanned(robot: Robot, count: int) -> Reals:
@@ -324,7 +323,7 @@ def nearest_value(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Reals:
     return found
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LazySelfMotions(Sequence[SelfMotionCurve]):
     """What :func:`all_motions` gives, traced when it is first read."""
 
@@ -381,7 +380,7 @@ def _is_same_root(robot: Robot, x: Reals, others: list[Reals], chain: PoseChain)
     return apart < SAME_ROW or (apart < MAYBE_SAME and apart * chain.smallest(x) < SPREAD)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ClassSlots:
     """All slots of a block of poses.
 
@@ -449,7 +448,7 @@ def slots_of_class(
     for n in np.flatnonzero(certainty != CERTAIN).tolist() if alone else ():
         own = q_ref[0 if len(q_ref) == 1 else n]
         rows = unwound(robot, q[n])
-        settled[n] = settle(robot, T[n], rows[np.isfinite(rows[:, 0])], own, values[n : n + 1], int(certainty[n]))
+        settled[n] = settle(robot, T[n], rows[np.isfinite(rows[:, 0])], own, int(certainty[n]))
         q[n] = nearest_equivalent(robot, _in_slots(robot, rows, settled[n]), own)
         inside[n] = within(robot, q[n])
     each_its_own = alone and len(q_ref) == count

@@ -22,6 +22,7 @@ import numpy as np
 
 from er3a.errors import Er3aError
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
+from er3a.geometry.vectors import Rows, Vector
 from er3a.numerics.arrays import Flags, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel
 from er3a.robots.robot import Robot, derived
@@ -305,8 +306,8 @@ def post_rotate_z(A: Reals, c: float, s: float) -> None:
 
 
 @inner_kernel
-def rows_at(w: Reals, size: int, at: int) -> tuple[float, ...]:
-    """The first three rows of one of several transforms that are stored entry by entry. Kernel.
+def rows_at(w: Reals, size: int, at: int) -> tuple[Rows, Vector]:
+    """Rotation and position of one of several transforms that are stored entry by entry. Kernel.
 
     Parameters
     ----------
@@ -316,9 +317,9 @@ def rows_at(w: Reals, size: int, at: int) -> tuple[float, ...]:
 
     Returns
     -------
-    entries : twelve, row by row
+    rows, position : of the rotation, and the origin
     """
     a, b, c, x = w[at], w[size + at], w[2 * size + at], w[3 * size + at]
     d, e, f, y = w[4 * size + at], w[5 * size + at], w[6 * size + at], w[7 * size + at]
     g, h, k, z = w[8 * size + at], w[9 * size + at], w[10 * size + at], w[11 * size + at]
-    return a, b, c, x, d, e, f, y, g, h, k, z
+    return ((a, b, c), (d, e, f), (g, h, k)), (x, y, z)

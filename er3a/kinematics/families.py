@@ -17,12 +17,12 @@ compensate for it by least squares.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, frozen, shortly
 from er3a.geometry.transforms import skew_part
 from er3a.geometry.vectors import TURN, signed_angle, wrap_to_pi
 from er3a.kinematics.chain import arm_length
@@ -196,7 +196,7 @@ CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("el
 FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Family(ByValue, Displayed):
     """A continuum of solutions of one pose.
 

@@ -301,7 +301,7 @@ def is_complete(robot: Robot, certainty: Integers) -> Flags:
     complete : (N,) bool; always True for classes that don't eliminate
     """
     solver = by_class.arm_solver(robot).chain
-    closed = not ARM_CLASSES[solver.code].eliminates and not isinstance(solver, LinkedRows)
+    closed = ARM_CLASSES[solver.code].closed_form and not isinstance(solver, LinkedRows)
     return np.asarray((certainty == CERTAIN) | closed)
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 import scipy
 
-from er3a.geometry.transforms import rpy_of, transform
+from er3a.by_value import by_identity
+from er3a.geometry.transforms import exp_rotation, rotation_angle, rpy_of, transform
 from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import size_of
@@ -29,7 +29,7 @@ Usable = Callable[[Reals], Flags]
 """Which arms (N, n), rad, within the limits count, (N,)."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Neighbours:
     """Poses near a refused one that have a solution within the limits.
 
@@ -89,7 +89,7 @@ def neighbours(robot: Robot, T: Reals, usable: Usable) -> Neighbours:
 
     def turned(turns: Reals) -> Reals:
         """Poses (N, 4, 4) turned by rotation vectors (N, 3)."""
-        return _turned(T, scipy.spatial.transform.Rotation.from_rotvec(turns).as_matrix())
+        return _turned(T, exp_rotation(turns))
 
     def shifted(shifts: Reals) -> Reals:
         """Poses (N, 4, 4) shifted by vectors (N, 3), m."""
@@ -103,10 +103,9 @@ def neighbours(robot: Robot, T: Reals, usable: Usable) -> Neighbours:
     turns = _first(robot, spread[solved], usable) is not None
     turn = _least(robot, turned, (np.zeros(3), np.pi, TURN_GRID), usable, SPARE_TURNS) if turns else None
     shift = _least(robot, shifted, (robot.base[:3, 3] - T[:3, 3], half, SHIFT_GRID), usable, SPARE_SHIFTS)
-    back = None if turn is None else scipy.spatial.transform.Rotation.from_matrix(turn[:3, :3] @ T[:3, :3].T)
     return Neighbours(
         orientation_ratio=float(solved.mean()),
-        least_turn=None if back is None else float(back.magnitude()),
+        least_turn=None if turn is None else float(rotation_angle(T[:3, :3], turn[:3, :3])),
         turned_to=None if turn is None else rpy_of(turn),
         least_shift=None if shift is None else float(np.linalg.norm(shift[:3, 3] - T[:3, 3])),
         shifted_to=None if shift is None else shift[:3, 3],

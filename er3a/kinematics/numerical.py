@@ -23,12 +23,12 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import NamedTuple
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
@@ -372,7 +372,7 @@ def all_found(robot: Robot, T: Reals, starts: int) -> Reals:
     return q[distinct(robot, q, SAME_ARM)]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Search:
     """A search for poses of one robot: what must be met, to which tolerances (m, rad), from which random numbers."""
 
@@ -444,8 +444,7 @@ class _Search:
         )
         low, high = (robot.lower, robot.upper) if respect else self.without_limits()
         limits, q = (for_kernel(low / units), for_kernel(high / units), respect), q0 / units
-        motion = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        motion = for_kernel(robot.direction[:, None] * motion * units)
+        motion = for_kernel(robot.direction[:, None] * robot.joint_to_row * units)
         arm = motion, joint_starts(robot), for_kernel(constant_links(robot)), for_kernel(robot.sliding)
         goal, T = (for_kernel(self.mask), for_kernel(self.tolerances), length), for_kernel(T)
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import arm_solver, misses, parameters_of
 from er3a.kinematics.forward import forward
@@ -21,7 +20,7 @@ NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR
 MAX_BY_CLASS = 500  # poses solved in validation for arms without a spherical wrist
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class BatchRoundTrips:
     """All solutions of random poses, put back through forward kinematics.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, frozen, shortly
 from er3a.kinematics.chain import joint_starts, row_values
 from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
 from er3a.numerics.arrays import Flags, Reals
@@ -21,7 +21,7 @@ NARROWINGS = 10  # each to a sixth of the interval
 SAME_TURN, COVERS = 1e-6, 1e-6  # rad: what rounding makes of equal turns, and of ends of one part
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class SelfMotionCurve(ByValue, Displayed):
     """A part of a curve of solutions of one pose: joints move with the tool at rest.
 

@@ -29,9 +29,10 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from er3a.by_value import Displayed, Sheet
+from er3a.by_value import Displayed, Sheet, by_identity, frozen
 from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.kinematics.chain import arm_length, axes_at_zero_theta, constant_links, row_values
+from er3a.kinematics.classes.arm_angle import vector_of
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
 from er3a.kinematics.wrist_partitioned import (
     has_branches,
@@ -76,7 +77,7 @@ class Conditioning(Displayed):
         return Sheet.of_table(f"Conditioning at {count} joint vector(s)", columns, zip(*measures))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class DeterminantFactors:
     """Signed distances from the three singular sets; a change of sign is a crossing.
 
@@ -154,9 +155,10 @@ def wrist_and_forearm(robot: Robot) -> tuple[Reals, bool]:
 
 
 @derived
-def _of_factors(robot: Robot) -> tuple[Reals, Reals, bool]:
+def _of_factors(robot: Robot) -> tuple[Reals, Vector, bool]:
     """What the kernel of factors takes of an arm: its links, its wrist in the tool, where its forearm ends."""
-    return constant_links(robot), *wrist_and_forearm(robot)
+    wrist, to_axis_4 = wrist_and_forearm(robot)
+    return constant_links(robot), vector_of(wrist), to_axis_4
 
 
 def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
@@ -203,11 +205,11 @@ def factors_where_defined(robot: Robot, q: Reals) -> DeterminantFactors:
 
 @kernel
 def _factors(
-    q: Reals, zeros: tuple[Reals, Reals], links: Reals, wrist_in_tool: Reals, to_axis_4: bool, out: Reals
+    q: Reals, zeros: tuple[Reals, Reals], links: Reals, wrist_in_tool: Vector, to_axis_4: bool, out: Reals
 ) -> None:
     """Fill ``out`` (N, 3): wrist, elbow and shoulder at joint angles ``q`` (N, 6)."""
     direction, offset = zeros
-    w, p = np.empty((6, 3)), np.empty((6, 3))
+    w, p = np.empty((6, 3)), np.empty((7, 3))  # directions, and origins with the wrist behind them
     for n in range(q.shape[0]):
         x, y, z = rows_of(links[0])
         for k in range(6):
@@ -217,19 +219,12 @@ def _factors(
             c, s = np.cos(angle), np.sin(angle)
             x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
             x, y, z = step_row(x, link), step_row(y, link), step_row(z, link)
-        i, j, k = wrist_in_tool[0], wrist_in_tool[1], wrist_in_tool[2]
-        wrist = (
-            x[0] * i + x[1] * j + x[2] * k + x[3],
-            y[0] * i + y[1] * j + y[2] * k + y[3],
-            z[0] * i + z[1] * j + z[2] * k + z[3],
-        )
-        w1, w2, w5 = (w[0, 0], w[0, 1], w[0, 2]), (w[1, 0], w[1, 1], w[1, 2]), (w[4, 0], w[4, 1], w[4, 2])
-        p2, p3 = (p[1, 0], p[1, 1], p[1, 2]), (p[2, 0], p[2, 1], p[2, 2])
-        sideways = cross(w1, w2)
-        out[n, 0] = _angle_short_of_line((w[3, 0], w[3, 1], w[3, 2]), (w[5, 0], w[5, 1], w[5, 2]), w5)
-        forearm_end = (p[3, 0], p[3, 1], p[3, 2]) if to_axis_4 else wrist
-        out[n, 1] = _angle_short_of_line(subtract(p3, p2), subtract(forearm_end, p3), w2)
-        from_axis = subtract(wrist, (p[0, 0], p[0, 1], p[0, 2]))
+        for k, row in enumerate((x, y, z)):
+            p[6, k] = dot(row[:3], wrist_in_tool) + row[3]
+        sideways, from_axis = cross(w[0], w[1]), subtract(p[6], p[0])
+        out[n, 0] = _angle_short_of_line(w[3], w[5], w[4])
+        forearm_end = p[3 if to_axis_4 else 6]
+        out[n, 1] = _angle_short_of_line(subtract(p[2], p[1]), subtract(forearm_end, p[2]), w[1])
         out[n, 2] = dot(sideways, from_axis) / np.sqrt(dot(sideways, sideways))
 
 
@@ -246,7 +241,7 @@ MAX_SAMPLES = 200_000  # of a motion; beyond that it is judged as it is sampled
 TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
 
 
-@dataclass(frozen=True)
+@frozen
 class RankLoss:
     """A stretch of a motion with a nearly dependent Jacobian.
 
@@ -304,13 +299,11 @@ def change_per_joint(robot: Robot) -> Reals:
     slide = np.zeros(len(points))
     if robot.sliding.any():
         most = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
-        coupling = np.eye(robot.rows) if robot.coupling is None else np.abs(robot.coupling)
-        slide = np.where(robot.sliding, coupling @ most, 0.0)
+        slide = np.where(robot.sliding, np.abs(robot.joint_to_row) @ most, 0.0)
     path = np.vstack([points, T[:3, 3]])
     reach = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum() + slide.sum()) / arm_length(robot)
     columns = np.sqrt(robot.joints * (1.0 + (2.0 * reach) ** 2))
-    weight = np.ones(robot.joints) if robot.coupling is None else np.abs(robot.coupling).sum(axis=0)
-    return np.asarray(np.full(robot.joints, columns) * weight)
+    return np.asarray(columns * np.abs(robot.joint_to_row).sum(axis=0))
 
 
 def rank_losses(
@@ -454,7 +447,7 @@ def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
 MIN_SINGULAR_VALUE = 0.02  # as about 5 deg from an aligned wrist, where a wrist counts as near-singular
 
 
-@dataclass(frozen=True)
+@frozen
 class NearSingular:
     """Distance from each singular set below which a pose is near-singular.
 

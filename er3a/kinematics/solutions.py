@@ -11,14 +11,14 @@ one factor of the Jacobian's determinant, so that a branch can only change where
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, frozen, shortly
 from er3a.errors import with_extra
 from er3a.finding import Finding, fact, is_one
 from er3a.geometry.vectors import TURN, wrap_to_pi
@@ -133,7 +133,7 @@ Unsolved = Finding
 memory."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Solutions(ByValue, Displayed):
     """Joint solutions of one pose (``inverse``) or of many (``inverse_batch``, ``solve``).
 
@@ -296,7 +296,7 @@ TargetOutcome = Literal["reached", "unreachable", "leaves limits", "collides"]
 """Whether an admissible solution exists, or what rules it out."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Target(ByValue, Displayed):
     """A pose of the tool.
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Tables(ByValue):
     """A batch of H tables of arms with the same base and flange.
 

@@ -6,11 +6,10 @@ base and tool need no cases of their own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import by_identity
 from er3a.errors import NotWristPartitionedError
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import frame_along
@@ -29,7 +28,7 @@ PARALLEL = 1e-9  # rad
 ClosedFormMissing = Finding
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class WristPartitionedArm:
     """Axis lines of such an arm with all theta at 0, in the base frame (m).
 

@@ -86,6 +86,24 @@ def as_floats(values: Reals, argument: str) -> Reals:
         raise PoseError(f"{argument} holds something that is no real number, or rows that differ in length") from None
 
 
+def zeros_of(polynomials: Reals | Complexes) -> Complexes:
+    """Zeros of polynomials of one degree: the eigenvalues of their companion matrices.
+
+    Parameters
+    ----------
+    polynomials : (N, n + 1), coefficients in ascending order; none of the last is 0
+
+    Returns
+    -------
+    zeros : (N, n), in no order
+    """
+    count, degree = len(polynomials), polynomials.shape[1] - 1
+    companion = np.zeros((count, degree, degree), dtype=polynomials.dtype)
+    companion[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
+    companion[:, :, -1] = -polynomials[:, :-1] / polynomials[:, -1:]
+    return np.asarray(np.linalg.eigvals(companion))
+
+
 def runs(flags: Flags) -> list[tuple[int, int]]:
     """Stretches of True in a row of flags.
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
@@ -29,7 +29,7 @@ CHECKS_PER_SAMPLE = 5
 SEED = 0  # of the planner
 
 
-@dataclass(frozen=True)
+@frozen
 class PathProgram:
     """A path as a program.
 

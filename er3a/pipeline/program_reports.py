@@ -6,13 +6,14 @@ import math
 import os
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.units import noted_doubts
@@ -52,7 +53,7 @@ NEEDED: Mapping[Check, str] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class CheckedFile:
     """A program file with its check, or with the error that it could not be read for.
 

@@ -26,7 +26,7 @@ from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform
 
 from pydantic import ValidationError
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically, write_text
@@ -53,7 +53,7 @@ Status = Literal["pass", "caution", "fail", "no_reference", "not_computed"]
 Foundation = Literal[Status, "unsettled"]  # a caution about a table of which independent documents settle no entry
 
 
-@dataclass(frozen=True)
+@frozen
 class Verdict:
     """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found.
 
@@ -104,7 +104,7 @@ class Verdict:
         return replace(self, status="caution" if near else self.status, shapes=shapes)
 
 
-@dataclass(frozen=True)
+@frozen
 class Figure:
     """A key figure.
 
@@ -123,7 +123,7 @@ class Figure:
 
 
 @dataclass_transform(frozen_default=True)
-@dataclass(frozen=True)
+@frozen
 class Summary:
     """What all summaries begin with; a stage's own, a frozen dataclass like this one, says what its verdict can be.
 
@@ -155,7 +155,7 @@ ResultsT = TypeVar("ResultsT", bound="Results")
 
 
 @dataclass_transform(frozen_default=True, eq_default=False)
-@dataclass(frozen=True, eq=False)
+@frozen
 class Results(ByValue):
     """A stage's results: a subclass, a frozen dataclass like this one, says which summary, and adds tables."""
 
@@ -165,7 +165,7 @@ class Results(ByValue):
         dataclass(frozen=True, eq=False)(cls)
 
 
-@dataclass(frozen=True)
+@frozen
 class Input:
     """An input file: path from the project's root, checksum, and the grades that stand in it."""
 
@@ -174,7 +174,7 @@ class Input:
     grades: Mapping[str, list[str] | int]
 
 
-@dataclass(frozen=True)
+@frozen
 class Provenance:
     """What numbers rest on; pages over several stages have no settings of their own."""
 
@@ -184,7 +184,7 @@ class Provenance:
     seed: int | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Stored(ByValue, Generic[ResultsT]):
     """Results as they were read, and where they come from.
 

@@ -10,8 +10,10 @@ summary's ``assumed``: it lowers no verdict, and is said once.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
+
+from er3a.by_value import frozen
 
 Check = Literal[
     "table",
@@ -66,7 +68,7 @@ OF_MOTIONS: tuple[Check, ...] = ("reach", "rates", "program_lines")
 """What has to be known of a motion before anything else can be said of it."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Open:
     """A reason why a check does not cover all, or an assumption.
 
@@ -82,7 +84,7 @@ class Open:
     amount: float | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Coverage:
     """How much of what a stage was asked a check covers.
 

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.finding import plain, revived
 from er3a.numerics.si_units import filled, split_unit, unit_text
 
@@ -37,7 +37,7 @@ Texts = NDArray[np.object_]
 Findings = NDArray[np.object_]
 
 
-@dataclass(frozen=True)
+@frozen
 class Column:
     """What a column, or a group of columns with one array, holds.
 
@@ -193,7 +193,7 @@ def _numbered(name: str) -> str:
 
 
 @dataclass_transform(frozen_default=True, eq_default=False)
-@dataclass(frozen=True, eq=False)
+@frozen
 class Table(ByValue):
     """Base of all tables, which makes frozen dataclasses of its subclasses; see the module."""
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
+from er3a.by_value import frozen
 from er3a.files.kept_files import write_atomically
 from er3a.pipeline import language
 from er3a.pipeline.messages.say import joined, say_all, sentence
@@ -36,7 +37,7 @@ Level = Literal["caution", "fail"]
 NOT_EXAMINED: Literal["not_examined"] = "not_examined"
 
 
-@dataclass(frozen=True)
+@frozen
 class StageVerdict:
     """What a stage says of a robot.
 

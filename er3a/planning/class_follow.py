@@ -22,12 +22,13 @@ that this one can't.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.errors import Er3aError, NotWristPartitionedError
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.by_class import arm_solver, checked_parameters, class_rows
@@ -52,7 +53,7 @@ SLOPE_PRICE = 1e-3  # rad of margin that a change by 1 rad has to gain
 ROUNDS, FIRST_STEP = 7, np.radians(7.5)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ArmAngleLaw:
     """An arm angle along a path: values (3,), rad, at the start, halfway and at the end.
 
@@ -107,7 +108,7 @@ def laws_with_most_margin(
     return sorted(found, key=lambda law: -law.margin)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _LawSearch:
     """Margins of laws at poses T (K, 4, 4) and shares (K,), by slots (s,); ``start`` (n,), rad, holds the joints' turns
     at the start, None leaves them open."""

@@ -13,6 +13,7 @@ from typing import assert_never
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.errors import InputError, PathError, PoseError
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import branch_labels
@@ -25,7 +26,7 @@ from er3a.planning.way_around import PlannedMove
 from er3a.robots.robot import Robot
 
 
-@dataclass(frozen=True)
+@frozen
 class CommandSource:
     """Where a command was read, for errors: a file and a field in it; neither for one made in Python."""
 
@@ -48,7 +49,7 @@ class CommandSource:
         return InputError(self.file, f"{self.field}{separator}{part}", problem, remedy)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Start:
     """Where a path starts: at one of joint angles (6,), a pose (4, 4), or the end of an earlier path.
 
@@ -68,7 +69,7 @@ class _Command:
     source: CommandSource = field(default_factory=CommandSource)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class JointMoveCommand(_Command):
     """All joints together to angles (6,) in rad, in so many seconds.
 
@@ -84,7 +85,7 @@ class JointMoveCommand(_Command):
     accelerations: Ends = (0.0, 0.0)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class JointSequenceCommand(_Command):
     """Joint moves through points (n, 6) in rad.
 
@@ -101,7 +102,7 @@ class JointSequenceCommand(_Command):
     ramp: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SegmentCommand:
     """A line of the tool to a pose (4, 4), or an arc through ``via`` (3,) in m.
 
@@ -117,7 +118,7 @@ class SegmentCommand:
     blend: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ToolMoveCommand(_Command):
     """One line or arc; ``ramp`` as of :class:`JointSequenceCommand`."""
 
@@ -127,7 +128,7 @@ class ToolMoveCommand(_Command):
     ramp: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ToolSequenceCommand(_Command):
     """Lines and arcs one after another; ``duration`` and ``ramp`` as of :class:`JointSequenceCommand`."""
 
@@ -137,7 +138,7 @@ class ToolSequenceCommand(_Command):
     ramp: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class JointTableCommand(_Command):
     """Through joint angles (n, 6) in rad, none of which repeats the one before.
 
@@ -156,7 +157,7 @@ class JointTableCommand(_Command):
     rates: StatedRates | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ToolTableCommand(_Command):
     """Through poses (n, 4, 4); the rest as of :class:`JointTableCommand`, with ``blend`` in m.
 
@@ -174,7 +175,7 @@ class ToolTableCommand(_Command):
     half_turn_axis: Reals | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PlanCommand(_Command):
     """A motion to be planned, between joint angles (n,) in rad or poses (4, 4)."""
 
@@ -190,7 +191,7 @@ Command = JointCommand | ToolCommand | PlanCommand
 GEOMETRY = 1.0  # s; a segment's own duration is of no account in a sequence
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Built:
     """A path, ready to be carried out.
 

@@ -29,12 +29,12 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from itertools import product
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.by_value import ByValue, Displayed, Sheet, by_identity, frozen
 from er3a.errors import PoseError
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import arm_length
@@ -56,7 +56,7 @@ FREE_SHOULDER = 1e-10  # m; below it rounding decides joint 1
 STRAIGHT_ELBOW = 1e-3  # rad; the angle of the elbow grows with the root of the distance from the edge of reach
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Branches:
     """Closed-form solutions along a line.
 
@@ -292,7 +292,7 @@ BESIDE = (1e-4, 1e-3)  # shares of the path to step aside from a singular point
 AGREE = 1e-2  # relative, between the two sides of a singular point
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class BranchJump(ByValue):
     """A place where the branch in use ends and no other continues it.
 
@@ -306,7 +306,7 @@ class BranchJump(ByValue):
     angle: float
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Followed(ByValue, Displayed):
     """Joint angles along a line, with additional times where its branches come near to each other.
 
@@ -517,7 +517,7 @@ def _jacobian_rate(robot: Robot, J: Reals, dq: Reals) -> Reals:
     A row i that turns by w_i has the linear column v_i; turning row j changes w_i by w_j x w_i if j comes first, and
     v_i by w_j x v_i if j is not after i, else by w_i x v_j. Both v may be divided by any length.
     """
-    coupling = np.eye(J.shape[2]) if robot.coupling is None else robot.coupling
+    coupling = robot.joint_to_row
     columns = np.swapaxes(J @ np.linalg.inv(coupling), 1, 2)
     moving = columns * (dq @ coupling.T)[..., None]
     v, w = columns[..., :3], columns[..., 3:]
@@ -534,7 +534,7 @@ SWITCH_STEP = 1e-4
 EQUAL = 6  # digits of rad to which travel and margin count
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Sequence:
     """One sequence through a stretch: angles (n, 6) in rad, slots (n,), jumps after points (n - 1,), and its cost."""
 

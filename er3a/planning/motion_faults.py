@@ -12,11 +12,12 @@ meets a sine to rounding, sines and shoulder distance become series too. A chang
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Generic, Literal, TypeVar
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.finding import Finding, fact, turned_or_moved
 from er3a.kinematics import singularity
 from er3a.kinematics.inverse import inverse
@@ -34,7 +35,7 @@ SAME_EVENT = 1e-8  # share of the duration
 LONG_STAY = 0.01  # share of the duration
 
 
-@dataclass(frozen=True)
+@frozen
 class SingularEvent:
     """A pass through, or next to, a singular set.
 
@@ -119,7 +120,7 @@ OVER = 1e-6  # relative, by which rounding may exceed a limit of rates
 CauseT = TypeVar("CauseT", bound=Finding)
 
 
-@dataclass(frozen=True)
+@frozen
 class Interval(Generic[CauseT]):
     """A stretch of time (s), what is wrong in it, and, where that has a value, when it is worst."""
 
@@ -129,7 +130,7 @@ class Interval(Generic[CauseT]):
     worst: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class RateLimit:
     """A limit of the joints' rates.
 
@@ -192,7 +193,7 @@ def joints_of(cause: Finding) -> tuple[int, ...]:
     return tuple(cause.params.get("joints", () if alone is None else (alone,)))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LimitSide:
     """One side of a limit of a joint, or of a sum of joints: ``sign * (factors @ q) <= sign * limit``; rad or m."""
 
@@ -371,8 +372,7 @@ def singular_events(robot: Robot, motion: PiecewiseMotion, near: singularity.Nea
 
 def _distances(robot: Robot, motion: PiecewiseMotion) -> tuple[Reals, Reals]:
     """Times (k + 1,), s, between which turns are short; series (3, k, d + 1) of the two sines and the shoulder's m."""
-    coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-    turning = (motion.angle[:, 1:] @ coupling.T)[..., 1:5]  # the first and the last axis turn all there is
+    turning = (motion.angle[:, 1:] @ robot.joint_to_row.T)[..., 1:5]  # the first and the last axis turn all there is
     turned = 2 * np.nan_to_num(np.abs(turning)).sum(axis=(1, 2))
     parts = np.maximum(1, np.ceil(turned / LONGEST_TURN)).astype(int)
     piece = np.repeat(np.arange(len(parts)), parts)

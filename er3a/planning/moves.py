@@ -18,12 +18,11 @@ References
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, frozen
 from er3a.errors import Er3aError, PoseError
 from er3a.geometry.transforms import check_poses, exp_rotation, log_rotation, posed
 from er3a.numerics.arrays import Reals
@@ -121,7 +120,7 @@ class ToolPath(Protocol):
         """
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class JointMove(ByValue, Displayed):
     """All joints start and stop together.
 
@@ -168,7 +167,7 @@ class JointMove(ByValue, Displayed):
         return polynomial_motion(self.joints, np.array([0.0, self.duration]), 5)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Segment(ByValue, Displayed, ABC):
     """What a :class:`Line` and an :class:`er3a.planning.sequences.Arc` of the tool share.
 
@@ -314,7 +313,7 @@ class Segment(ByValue, Displayed, ABC):
         return ((1, self.rotation / np.pi),) if self.half_turn else ()
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Line(Segment):
     """A straight line of the tool; ``translation`` (3,), m, leads from start to end in the base frame."""
 

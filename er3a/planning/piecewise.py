@@ -13,14 +13,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy
 from numpy.polynomial import chebyshev
 
-from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.by_value import ByValue, Displayed, Sheet, by_identity, frozen
 from er3a.numerics.arrays import Integers, Reals
 from er3a.planning.profiles import Rates, pieces_at
 
@@ -37,7 +36,7 @@ INSET = (
 Stretch = tuple[float, float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Pieces:
     """A scalar function of time, one Chebyshev series for each piece.
 
@@ -144,7 +143,7 @@ class Pieces:
         return most, at
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class PiecewiseMotion(ByValue, Displayed):
     """A motion of n joints.
 
@@ -439,11 +438,8 @@ def interpolated(values: Reals) -> Reals:
     -------
     series : (m, d + 1, n)
     """
-    count = values.shape[1]
-    angles = np.pi * (np.arange(count) + 0.5) / count
-    basis = np.cos(np.outer(np.arange(count), angles)) * 2 / count
-    basis[0] /= 2
-    found: Reals = np.einsum("kc,mcn->mkn", basis, values)
+    found: Reals = scipy.fft.dct(values, axis=1) / values.shape[1]
+    found[:, 0] /= 2
     return found
 
 
@@ -473,9 +469,5 @@ def evaluated(series: Reals, i: Integers, x: Reals) -> Reals:
     -------
     values : (..., n)
     """
-    x = x[..., None]
-    b1 = b2 = np.zeros(series.shape[2])
-    for k in range(series.shape[1] - 1, 0, -1):
-        b1, b2 = series[i, k] + 2 * x * b1 - b2, b1
-    value: Reals = series[i, 0] + x * b1 - b2
-    return value
+    coefficients = np.moveaxis(series[i], -2, 0)
+    return np.asarray(chebyshev.chebval(x[..., None], coefficients, tensor=False), np.float64)

@@ -10,12 +10,12 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity, frozen
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Integers, Reals
 
@@ -26,7 +26,7 @@ BEYOND = 1e-6  # by which times and shares may miss a motion's ends, of the whol
 Ends = tuple[Reals | float, Reals | float]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Times:
     """When a sequence is at its corners; start and end count as corners.
 
@@ -40,7 +40,7 @@ class Times:
     corner: Integers
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LegTimes:
     """How long each leg of a sequence takes that stops at all its corners.
 
@@ -181,7 +181,7 @@ def trapezoid(t: Reals, duration: float, ramp: float | Reals) -> Rates:
     return x, dx / duration, ddx / duration**2
 
 
-@dataclass(frozen=True)
+@frozen
 class MotionLaw:
     """A trapezoidal speed profile.
 
@@ -261,7 +261,7 @@ class TimeLaw(Protocol):
     def __call__(self, t: Reals) -> Rates: ...
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class FromRestToRest:
     """From one halt to the next, on the quintic, or on the trapezoid if ``ramp`` is given.
 
@@ -316,7 +316,7 @@ class Timetable:
         slopes = scipy.interpolate.PchipInterpolator(self.times, self.progress).derivative()(self.times)
         slopes[np.asarray(halts, bool)] = 0.0
         slopes[[0, -1]] = 0.0
-        self._slopes = slopes
+        self._curve = scipy.interpolate.CubicHermiteSpline(self.times, self.progress, slopes)
 
     @property
     def breaks(self) -> Reals:
@@ -330,14 +330,9 @@ class Timetable:
 
     def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
-        t, i = pieces_at(t, self.times)
+        check_times(t := np.asarray(t, float), self.times[0], self.times[-1])
         t = np.clip(t, self.times[0], self.times[-1])
-        h, start = self.times[i] - self.times[i - 1], self.progress[i - 1]
-        step, v0, v1 = self.progress[i] - start, h * self._slopes[i - 1], h * self._slopes[i]
-        u = (t - self.times[i - 1]) / h
-        c2, c3 = 3 * step - 2 * v0 - v1, v0 + v1 - 2 * step
-        x = start + u * (v0 + u * (c2 + u * c3))
-        return x, (v0 + u * (2 * c2 + 3 * u * c3)) / h, (2 * c2 + 6 * u * c3) / h**2
+        return self._curve(t), self._curve(t, 1), self._curve(t, 2)
 
 
 def times_at(law: TimeLaw, shares: Reals) -> Reals:

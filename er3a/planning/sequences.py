@@ -21,13 +21,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, by_identity, frozen
 from er3a.errors import PathError, PoseError
 from er3a.geometry.transforms import check_poses, exp_rotation, posed
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -49,7 +48,7 @@ from er3a.planning.profiles import (
 ON_A_LINE = 1e-6  # rad; three points this near to a straight line fix no circle
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Arc(Segment):
     """A circular arc of the tool point.
 
@@ -157,7 +156,7 @@ def arc(
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Curve:
     """Pieces over a parameter that runs from 0 to 1.
 
@@ -242,7 +241,7 @@ ZERO_LENGTH = 1e-12  # m; shorter segments are left out
 RUNS_ON = 1e-9  # relative difference of twists below which a corner is none
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class SegmentPath(ByValue, Displayed):
     """A sequence as a :class:`er3a.planning.moves.ToolPath`.
 
@@ -372,7 +371,7 @@ class SegmentPath(ByValue, Displayed):
         return x, dx, ddx
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class JointSequence:
     """Straight sides in joint space, their corners rounded or stopped at; all joints together.
 
@@ -416,7 +415,7 @@ class JointSequence:
         return polynomial_motion(self.joints, breaks, self.law.degree * (POWERS - 1))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Leg:
     """A straight way of the joints: from ``start`` (n,) by ``step`` (n,), rad."""
 
@@ -431,7 +430,7 @@ class _Leg:
         return self.step, np.zeros_like(self.step)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Piece:
     """A piece of a sequence: of a part between shares of it, or the rounded corner where a part begins.
 

@@ -16,11 +16,11 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import POWERS, Rates, check_times, joining
@@ -33,7 +33,7 @@ TINY = 1e-12  # rad/s or m/s
 SAME_RATE = 1e-6  # of the largest rate: steps that rounding makes
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class StatedRates:
     """Velocities and accelerations (k, n) at the points of a trajectory, rad/s and rad/s^2 (m of prismatic joints);
     rows of NaN where a point states none."""
@@ -42,7 +42,7 @@ class StatedRates:
     accelerations: Reals
 
 
-@dataclass(frozen=True)
+@frozen
 class RateMisfit:
     """Two rates of a joint (from 0) at a time, s, that no motion has both; of order 1 in rad/s, of order 2 in rad/s^2.
 
@@ -58,7 +58,7 @@ class RateMisfit:
     other: float
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class StatedMotion:
     """A move of the joints through points at their times.
 

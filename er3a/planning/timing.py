@@ -15,14 +15,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, by_identity, frozen
 from er3a.errors import Er3aError
 from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Flags, Reals
@@ -48,7 +47,7 @@ class TimingError(Er3aError):
         super().__init__(f"no time law ({finding.code})")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointLimits(ByValue):
     """Limits of the joints' rates, each (n,).
 
@@ -80,7 +79,7 @@ class JointLimits(ByValue):
         return (*found, *([] if self.jerk is None else [RateLimit(3, self.jerk, none, step, self.sliding)]))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Timed:
     """A motion of the joints.
 

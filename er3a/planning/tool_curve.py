@@ -15,10 +15,9 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import WIDE_STEP, Followed, follow
@@ -37,7 +36,7 @@ MAX_PIECES = 20_000  # that are tried
 MAX_ROUNDS = 3
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Tried:
     """Pieces (m,), and the series (m, d + 1, 3, n) through what was solved on them.
 

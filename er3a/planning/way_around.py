@@ -19,12 +19,12 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.shapes import link_frames
@@ -55,7 +55,7 @@ MAX_PAIRS = 4  # of start and end, the nearest: each failed search takes all its
 LIKELY = (0.5, 0.25, 0.75)  # shares of a move at which it is tried first
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class WayAround:
     """A motion that keeps clear.
 
@@ -71,7 +71,7 @@ class WayAround:
     along: ClearanceAlong
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PlanningTask:
     """What all motions of a robot have in common.
 
@@ -147,7 +147,7 @@ def _clear_at_ends(task: PlanningTask, start: Reals, end: Reals) -> float | Find
     return float(clear.min())
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PlannedMove:
     """A planned motion as a move of the joints, as :class:`er3a.planning.moves.JointMove` is one."""
 
@@ -215,7 +215,7 @@ class _Moves:
 
     def __init__(self, robot: Robot, bodies: Bodies, margin: float) -> None:
         self.bodies, self.margin = bodies, margin
-        self.coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
+        self.coupling = robot.joint_to_row
         T = link_frames(robot, np.zeros(len(robot.lower)))
         origins = T[[capsule.link for capsule in bodies.capsules], None, :3, 3]
         reach = np.linalg.norm(bodies.ends(np.zeros(len(robot.lower))) - origins, axis=-1).max()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from difflib import get_close_matches
 from itertools import chain
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.by_value import ByValue, Displayed, Sheet, by_identity, frozen
 from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import has_bare_tool, shapes_assumed
@@ -68,7 +68,7 @@ def _always() -> bool:
     return True
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class CheckOptions(ByValue):
     """Settings of a program check.
 
@@ -98,7 +98,7 @@ class CheckOptions(ByValue):
     keep_on: Callable[[], bool] = _always
 
 
-@dataclass(frozen=True)
+@frozen
 class LocatedFinding:
     """A finding and its place.
 
@@ -119,7 +119,7 @@ class LocatedFinding:
     moment: float | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class MotionVerdict:
     """The result for a motion instruction of the program's text.
 
@@ -149,7 +149,7 @@ class MotionVerdict:
         return not self.followed and self.level == "note"
 
 
-@dataclass(frozen=True)
+@frozen
 class CycleTime:
     """How long the main way takes, or one round of it if it is repeated for ever: estimates.
 
@@ -169,7 +169,7 @@ class CycleTime:
     complete: bool
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class ProgramCheck(ByValue, Displayed):
     """The result of a program check.
 
@@ -422,7 +422,7 @@ def _cycle(
 SAME_PLACE = 1e-6  # rad or m, by which the start of a motion may be off the end of the one before
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ProgramPart:
     """A stretch of a program, with a stop at each target: joint moves, or lines and arcs.
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.errors import PoseError
 from er3a.finding import Amount, Finding, fact, turned_or_moved
 from er3a.geometry.transforms import rotation_angle
@@ -54,7 +54,7 @@ Poses = Callable[[Reals], Reals]
 """T_world_tool (k, 4, 4), m, at shares of the way (k,)."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class CheckRules(ByValue):
     """What motions are checked against.
 
@@ -68,7 +68,7 @@ class CheckRules(ByValue):
     limits: JointLimits
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class MotionPath(ByValue):
     """A motion's way: straight in joint space between points that are near to each other.
 

@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.numerics.arrays import Reals
 from er3a.programs import syntax
 from er3a.programs.instructions import (
@@ -48,7 +48,7 @@ Flange = Callable[[Reals], Reals]
 """T_robot_flange (4, 4) of joint angles (n,) in rad."""
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Cell(ByValue):
     """The robot cell in which a program runs.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal, Protocol
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, frozen, slotted
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place
 from er3a.programs.syntax import Program, Value
@@ -27,7 +27,7 @@ Mover = Callable[[ArmMotion, "Reals | None"], Moved]
 """Solves a motion from joints (n,), rad or m, None where they are not known."""
 
 
-@dataclass(frozen=True)
+@frozen
 class RunLimits:
     """How far a program is followed, and what is assumed of it.
 
@@ -49,7 +49,7 @@ class RunLimits:
     assumed_values: Mapping[str, Value] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Step:
     """An instruction that is carried out.
 
@@ -70,7 +70,7 @@ class Step:
     moved: Any = None
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Ending:
     """How a way through the program ends.
 
@@ -91,7 +91,7 @@ class Ending:
     entry: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@slotted
 class Execution(ByValue, Displayed):
     """A program that was run.
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import assert_never
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
@@ -35,7 +35,7 @@ from er3a.robots.robot import Robot
 TO_START = Rate(0.1, "share")
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PathListing:
     """A path as a sequence.
 

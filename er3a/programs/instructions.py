@@ -22,15 +22,15 @@ Angles are in (-180, 180]. Where the middle angle is +-90 deg the last one is 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue
-from er3a.geometry.transforms import exp_rotation, log_rotation, rpy_of, transform
+from er3a.by_value import ByValue, slotted
+from er3a.geometry.transforms import exp_rotation, log_rotation, quaternion_of, rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import MassBody
 
@@ -49,7 +49,7 @@ Unresolved = Literal[
 ]
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Place:
     """Where an instruction was read.
 
@@ -70,7 +70,7 @@ class Place:
         return f"line {self.line}" + (f", {self.element}" if self.element else "")
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Rate:
     """A speed or an acceleration as the program gives it.
 
@@ -93,7 +93,7 @@ class Rate:
         return float(number) if known else None
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class UnclearLoad:
     """A load that a program names, by the text of it, without all its numbers; ``mass`` (kg) where that is known."""
 
@@ -104,7 +104,7 @@ class UnclearLoad:
 Load = MassBody | UnclearLoad
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Zone:
     """How near to a target the arm must be before it goes on.
 
@@ -124,7 +124,7 @@ RAMP_OF_A_DURATION = 1 / 3
 """Share of the time that a program gives for a motion, on the way up and on the way down."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@slotted
 class NamedFrame(ByValue):
     """A tool (T_flange_tool) or base (T_robot_base) that targets refer to.
 
@@ -142,7 +142,7 @@ class NamedFrame(ByValue):
     own: bool = True
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@slotted
 class JointTarget(ByValue):
     """Joint angles (n,) in rad; NaN for a joint that stays as it is.
 
@@ -156,7 +156,7 @@ class JointTarget(ByValue):
     external: tuple[tuple[str, float], ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@slotted
 class MeantSolution(ByValue):
     """Which of several solutions a target means.
 
@@ -172,7 +172,7 @@ class MeantSolution(ByValue):
     behind_lower_arm: bool | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@slotted
 class PoseTarget(ByValue):
     """T_base_tool (4, 4) in m, in the motion's base and for its tool.
 
@@ -194,7 +194,7 @@ class PoseTarget(ByValue):
     branch: MeantSolution | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class UnresolvedTarget:
     """A target that the program's text alone does not fix: a taught point that is not in it, a NaN.
 
@@ -210,7 +210,7 @@ class UnresolvedTarget:
 Target = JointTarget | PoseTarget | UnresolvedTarget
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@slotted
 class ArmMotion(ByValue):
     """A motion of the arm.
 
@@ -244,7 +244,7 @@ class ArmMotion(ByValue):
     with_path: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Pause:
     """The program waits: for so many seconds, for a condition, or for the operator (both None)."""
 
@@ -252,7 +252,7 @@ class Pause:
     condition: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Output:
     """A signal is set."""
 
@@ -260,21 +260,21 @@ class Output:
     value: str
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Remark:
     """A comment."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Aside:
     """An instruction that is known to move nothing, such as a message or a load."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Unknown:
     """What is not understood; ``may_move`` if it can move the arm for all that is known, ``shapes`` if motions may go
     otherwise from here on, ``stops`` if the controller stops here."""
@@ -285,7 +285,7 @@ class Unknown:
     stops: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Decision:
     """A condition that only the running cell knows, and which side is followed from here."""
 
@@ -296,7 +296,7 @@ class Decision:
 Instruction = ArmMotion | Pause | Output | Remark | Aside | Unknown | Decision
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Listing:
     """Instructions in the order in which they are carried out, to be written.
 
@@ -362,5 +362,5 @@ def numbers_of(T: Reals, convention: Convention) -> tuple[float, ...]:
     elif convention == "ur":
         turned = log_rotation(T[:3, :3])
     else:
-        turned = scipy.spatial.transform.Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True)[[3, 0, 1, 2]]
+        turned = quaternion_of(T)
     return tuple(float(each) + 0.0 for each in (*xyz, *turned))

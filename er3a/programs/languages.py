@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.errors import InputError, ShapeError
 from er3a.finding import fact, is_one
 from er3a.geometry.transforms import check_poses
@@ -46,7 +47,7 @@ from er3a.programs.writing import WriteOptions, Writer, WrittenProgram
 from er3a.robots.robot import Robot
 
 
-@dataclass(frozen=True)
+@frozen
 class Language:
     """A language of robot programs.
 

@@ -10,10 +10,10 @@ import codecs
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from er3a.by_value import frozen
 from er3a.errors import InputError, given_bytes
 from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocation, Member, Opaque, Unary, Variable
 
@@ -389,7 +389,7 @@ MAX_PROGRAM_BYTES = 32_000_000
 HIGH_RUNS = re.compile(rb"[\x80-\xff]+")
 
 
-@dataclass(frozen=True)
+@frozen
 class ProgramText:
     """A file's text with lines that end in line feeds."""
 

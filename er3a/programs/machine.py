@@ -13,6 +13,7 @@ from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 
+from er3a.by_value import slotted
 from er3a.programs import syntax
 from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, root, variable_of
 from er3a.programs.execution import Ending, EndKind, Execution, Mover, RunLimits, Step
@@ -59,7 +60,7 @@ class Frame:
     decisions: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Visit:
     """What a way found at the end of a loop's last round: rounds, those through something unknown, and all values."""
 

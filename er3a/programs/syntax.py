@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, fields, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
-from er3a.by_value import ByValue, Displayed
+from er3a.by_value import ByValue, Displayed, slotted
 from er3a.finding import Finding
 from er3a.programs.instructions import Instruction, Place, Rate, RateUnit
 from er3a.programs.program_names import LanguageName
@@ -18,19 +18,19 @@ POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
 """Fields of a pose of URScript."""
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Unclear:
     """A value that the text does not fix, such as an input; ``text`` is what it was read from."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Unset(Unclear):
     """What a variable holds that was declared, and that nothing has been assigned to; ``text`` is its name."""
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Record:
     """Named values, in the language's own units: a position, a frame, a pose of URScript.
 
@@ -185,21 +185,21 @@ RETURNED = "%returned"
 """Variable of a routine whose declared type is that of its value."""
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Constant:
     """A literal value."""
 
     value: Value
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Variable:
     """A name."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Member:
     """``of.name``."""
 
@@ -207,7 +207,7 @@ class Member:
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Element:
     """``of[i, j]``."""
 
@@ -215,7 +215,7 @@ class Element:
     indices: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Invocation:
     """A function with its arguments; None for one that is left out."""
 
@@ -224,7 +224,7 @@ class Invocation:
     keywords: tuple[tuple[str, Expression], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Unary:
     """``-x``, ``not x``."""
 
@@ -232,7 +232,7 @@ class Unary:
     of: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Binary:
     """Two operands."""
 
@@ -241,7 +241,7 @@ class Binary:
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Aggregate:
     """KRL's ``{E6POS: X 1, Y 2}``."""
 
@@ -249,7 +249,7 @@ class Aggregate:
     items: tuple[tuple[str, Expression], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Listed:
     """``[1, 2]`` or, with kind ``p``, URScript's ``p[...]``."""
 
@@ -257,7 +257,7 @@ class Listed:
     items: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Opaque:
     """An expression that is not understood."""
 
@@ -267,7 +267,7 @@ class Opaque:
 Expression = Constant | Variable | Member | Element | Invocation | Unary | Binary | Aggregate | Listed | Opaque
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Assign:
     """``target = value``; ``type_name`` where it is declared here, in the routine alone if ``local``; ``sizes``: the
     last index in each dimension of a list of KRL that is declared here."""
@@ -281,14 +281,14 @@ class Assign:
     sizes: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Enter:
     """A loop begins with the next operation."""
 
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class GoTo:
     """Go on at ``to``."""
 
@@ -296,7 +296,7 @@ class GoTo:
     to: int
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Branch:
     """Go on if the condition holds, else at ``to``; ``counted``: at the head of a loop that counts."""
 
@@ -307,7 +307,7 @@ class Branch:
     counted: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Call:
     """Carry out a routine of the program; its value goes to the variable ``result``."""
 
@@ -319,7 +319,7 @@ class Call:
     result: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Return:
     """Leave the routine, or the program, if that ``ends``."""
 
@@ -328,7 +328,7 @@ class Return:
     ends: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Move:
     """A motion whose arguments are evaluated when it is reached.
 
@@ -347,7 +347,7 @@ class Move:
     settings: tuple[tuple[str, Expression], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Waiting:
     """A wait of so many ``seconds``, or for a condition, or for the operator."""
 
@@ -357,7 +357,7 @@ class Waiting:
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Doing:
     """A call of a function that is not in the program, for what it does; ``within``: in an expression that follows."""
 
@@ -367,7 +367,7 @@ class Doing:
     within: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Fixed:
     """An instruction that needs no evaluation."""
 
@@ -378,7 +378,7 @@ class Fixed:
 Operation = Assign | Enter | GoTo | Branch | Call | Return | Move | Waiting | Doing | Fixed
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class RoutineParameter:
     """A routine's parameter.
 
@@ -395,7 +395,7 @@ class RoutineParameter:
     named: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@slotted
 class Routine:
     """Code with a name; a run ends after its last operation.
 
@@ -411,7 +411,7 @@ class Routine:
     thread: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@slotted
 class Program(ByValue, Displayed):
     """A program that was read.
 
@@ -480,8 +480,8 @@ def parts(of: object) -> Iterator[Expression]:
         for each in of:
             yield from parts(each)
     elif isinstance(of, Expression | Operation) and not isinstance(of, Constant | Fixed):
-        for name in type(of).__slots__:
-            yield from parts(getattr(of, name))
+        for part in fields(of):
+            yield from parts(getattr(of, part.name))
 
 
 def within(of: Held, each: Each) -> Held:

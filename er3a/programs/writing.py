@@ -7,11 +7,11 @@ import re
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, by_identity, frozen
 from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import (
@@ -33,7 +33,7 @@ from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ReadyMotion:
     """A motion with all that is known of its start and end.
 
@@ -110,7 +110,7 @@ RESERVED = frozenset(
 ARC_DEVIATION = 0.0001  # m, of lines that stand for an arc
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class WrittenProgram(ByValue):
     """A program as files.
 
@@ -125,7 +125,7 @@ class WrittenProgram(ByValue):
     findings: tuple[Finding, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class WriteOptions(ByValue):
     """How a program is written.
 

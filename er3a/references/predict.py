@@ -1,29 +1,19 @@
 """The value of each reference as a model predicts it.
 
-Largest and smallest values over the joint limits, by optimisation.
-
-Points spread evenly over the box are evaluated in one batch; its best points and an equal number of others start a
-bounded truncated-Newton search each [1]_. Nothing is random: equal inputs give equal numbers.
-
-References
-----------
-.. [1] S. G. Nash, "Newton-type minimization via the Lanczos method", SIAM J. Numer. Anal. 21(4), 1984.
+Largest and smallest values over the joint limits are searched for (:mod:`er3a.robots.extremes`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
-from er3a.errors import RobotError
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import Tables, frames_of
 from er3a.numerics.arrays import Reals
-from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import (
     MM,
     ZERO_POSE,
@@ -35,15 +25,16 @@ from er3a.references.quantities import (
     not_of_arm,
 )
 from er3a.references.reference import INTERVAL_95, Reference, quantities_of
-from er3a.robots.joint_limits import meant, within
+from er3a.robots.extremes import highest
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 SCAN = 4096  # points of the first look at the box of joint values; one batch of forward kinematics
-STEP = 1e-6  # rad or m, of central differences: their error is least near the cube root of rounding
+IDLE = 1e-12  # m, that a joint without influence changes
 
 
 def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, Reals]:
-    """Find an extreme of a measure over all joint values within the limits [1]_.
+    """Find an extreme of a measure over all joint values within the limits.
 
     The robot's tool does not count. Joint 1 stays at 0 if it turns: none of the measures changes with it, or the side
     view is drawn there. Limits of sums of joints are kept. A joint without influence on the result is given as 0 (or
@@ -63,77 +54,19 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, Reals]:
     lower, upper = robot.lower.copy(), robot.upper.copy()
     if not robot.slides[0]:
         lower[0] = upper[0] = 0.0
-    joints = robot.joints
-    sign = -1.0 if quantity.extreme == "greatest" else 1.0
+    sign = 1.0 if quantity.extreme == "greatest" else -1.0
 
-    def cost(q: Reals) -> Reals:
+    def size(q: Reals) -> Reals:
         return sign * quantity.measure(frames(robot, q))
 
-    offsets = np.vstack([np.zeros(joints), STEP * np.eye(joints), -STEP * np.eye(joints)])
-
-    def cost_and_slope(q: Reals) -> tuple[float, Reals]:
-        values = cost(q + offsets)
-        return values[0], (values[1 : joints + 1] - values[joints + 1 :]) / (2 * STEP)
-
-    scan = quasi_random_points(lower, upper, SCAN)
-    if robot.combined:
-        return _within_sums(robot, scan, cost, cost_and_slope, starts, sign)
-    best = scan[np.argsort(cost(scan), kind="stable")[: (starts + 1) // 2]]
-    results = [
-        scipy.optimize.minimize(
-            cost_and_slope,
-            start,
-            jac=True,
-            method="TNC",
-            bounds=list(zip(lower, upper)),
-            options={"ftol": 1e-15, "xtol": 1e-12, "gtol": 1e-12, "maxfun": 100},
-        )
-        for start in (*best, *scan[: starts // 2])
-    ]
-    q = min(results, key=lambda result: result.fun).x
-    q = _without_idle_joints(q, lower, upper, cost)
-    return float(sign * cost(q) * MM), q
-
-
-def _within_sums(
-    robot: Robot,
-    scan: Reals,
-    cost: Callable[[Reals], Reals],
-    cost_and_slope: Callable[[Reals], tuple[float, Reals]],
-    starts: int,
-    sign: float,
-) -> tuple[float, Reals]:
-    """The extreme where sums of joints have limits too, by sequential quadratic programming."""
-    scan = scan[within(robot, scan)]
-    if not len(scan):
-        raise RobotError(robot.name, "its limits leave no joint values")
-    factors = np.array([limit.factors for limit in robot.combined])
-    ends = np.array([(limit.lower, limit.upper) for limit in robot.combined]).T
-    bounds = list(zip(robot.lower, robot.upper))
-    if not robot.slides[0]:
-        bounds[0] = (0.0, 0.0)
-    order = np.argsort(cost(scan), kind="stable")[:starts]
-    found = [scan[order[0]]]
-    for start in scan[order]:
-        sums = scipy.optimize.LinearConstraint(factors, ends[0], ends[1])
-        end = scipy.optimize.minimize(
-            cost_and_slope, start, jac=True, method="SLSQP", bounds=bounds, constraints=[sums]
-        )
-        if within(robot, end.x):
-            found.append(end.x)
-    q = min(found, key=lambda each: float(cost(each)))
-    return float(sign * cost(q) * MM), q
-
-
-def _without_idle_joints(q: Reals, lower: Reals, upper: Reals, cost: Callable[[Reals], Reals]) -> Reals:
-    """The extreme with joints at 0, or the limit nearest to it, that have no influence."""
+    q, value = highest(robot, size, (lower, upper), SCAN, starts)
     rest = np.clip(0.0, lower, upper)
-    for joint in range(len(q)):
+    for joint in range(robot.joints if not robot.combined else 0):
         trial = q.copy()
         trial[joint] = rest[joint]
-        if cost(trial) <= cost(q) + 1e-12:
+        if size(trial) >= value - IDLE:
             q = trial
-    return q
+    return float(sign * size(q) * MM), q
 
 
 REACH_STARTS = 32  # local searches for each extreme
@@ -241,19 +174,31 @@ def state_of(
     if extremes is None:
         wanted = dict.fromkeys(quantity for quantity in quantities if isinstance(quantity, Extreme))
         extremes = {quantity: search(robot, quantity, starts)[0] for quantity in wanted}
+    twist = robot.alpha[1:] if robot.convention == "modified" else robot.alpha[:-1]
+    return _state(robot, robot, frames(robot, joints_of(robot, poses)), _places(poses), twist, extremes)
+
+
+def _state(
+    robot: Robot,
+    table: Robot | Tables,
+    frames: Reals,
+    index: Mapping[Pose, int],
+    twist: Reals,
+    extremes: Mapping[Quantity, float],
+) -> ModelState:
+    """The state of a table, or of many, of an arm that gives what tables don't."""
     return ModelState(
-        frames=frames(robot, joints_of(robot, poses)),
-        index=_places(poses),
-        direction=robot.direction,
-        lower=robot.lower,
-        upper=robot.upper,
+        frames=frames,
+        index=index,
+        direction=table.direction,
+        lower=table.lower,
+        upper=table.upper,
         speed=robot.speed,
         extremes=extremes,
         slides=robot.slides,
         sliding=robot.sliding,
         coupling=robot.coupling,
-        columns={name: getattr(robot, name) for name in TABLE_COLUMNS}
-        | {"twist": robot.alpha[1:] if robot.convention == "modified" else robot.alpha[:-1]},
+        columns={name: getattr(table, name) for name in TABLE_COLUMNS} | {"twist": twist},
     )
 
 
@@ -312,20 +257,8 @@ class TablesState:
         -------
         state : with the batch dimension (H,)
         """
-        return ModelState(
-            frames=frames_of(tables, self.robot, self._rows),
-            index=self.index,
-            direction=tables.direction,
-            lower=tables.lower,
-            upper=tables.upper,
-            speed=self.robot.speed,
-            extremes={},
-            slides=self.robot.slides,
-            sliding=self.robot.sliding,
-            coupling=self.robot.coupling,
-            columns={name: getattr(tables, name) for name in TABLE_COLUMNS}
-            | {"twist": np.where(tables.modified[:, None], tables.alpha[:, 1:], tables.alpha[:, :-1])},
-        )
+        twist = np.where(tables.modified[:, None], tables.alpha[:, 1:], tables.alpha[:, :-1])
+        return _state(self.robot, tables, frames_of(tables, self.robot, self._rows), self.index, twist, {})
 
 
 def joints_of(robot: Robot, poses: Sequence[Pose]) -> Reals:

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal, cast
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.geometry.transforms import log_rotation
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
@@ -39,7 +40,7 @@ COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
 FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": -1}
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ModelState:
     """What quantities are read from.
 
@@ -116,7 +117,7 @@ class ModelState:
         return T[..., :3, 2] * sign * self.direction[..., row, None], T[..., :3, 3] * MM
 
 
-@dataclass(frozen=True)
+@frozen
 class Quantity(ABC):
     """One number about an arm; ``depends_on_table``: not on the joints' limits and speeds alone."""
 
@@ -179,7 +180,7 @@ class Quantity(ABC):
         return abs(expected - other_expected)
 
 
-@dataclass(frozen=True)
+@frozen
 class AxisAngle(Quantity):
     """Angle between a joint's axis in the zero pose and a direction; ``signed``: the direction of positive rotation."""
 
@@ -236,7 +237,7 @@ class AxisAngle(Quantity):
         return float(angle_between(np.array(self.toward), np.array(same.toward), self.signed and same.signed))
 
 
-@dataclass(frozen=True)
+@frozen
 class AxisCoordinate(Quantity):
     """A coordinate (base frame) of that point of a joint's axis, in the zero pose, which is nearest to ``point_mm``."""
 
@@ -265,7 +266,7 @@ class AxisCoordinate(Quantity):
         return AxisCoordinate, self.joint
 
 
-@dataclass(frozen=True)
+@frozen
 class QuantityAtPose(Quantity):
     """One number about an arm at a pose (manufacturer's angles, deg)."""
 
@@ -292,7 +293,7 @@ def value_at(pose: Pose, joint: int) -> float:
     return pose[joint - 1] if joint <= len(pose) else 0.0
 
 
-@dataclass(frozen=True)
+@frozen
 class PointCoordinate(QuantityAtPose):
     """A coordinate (base frame) of the flange or the wrist centre at a pose."""
 
@@ -318,7 +319,7 @@ class PointCoordinate(QuantityAtPose):
         return self.pose, self.point
 
 
-@dataclass(frozen=True)
+@frozen
 class FlangeTurn(QuantityAtPose):
     """A coordinate (base frame) of the rotation vector from a stated orientation of the flange to the arm's.
 
@@ -363,7 +364,7 @@ class FlangeTurn(QuantityAtPose):
         return abs(float(rotation_vectors_deg(turn)[COORDINATES.index(self.coordinate)]))
 
 
-@dataclass(frozen=True)
+@frozen
 class SectionCoordinate(QuantityAtPose):
     """The wrist centre in a side view (joint 1 at 0): x from axis 1, z from axis 2; ``unsigned``: ``|x|``, ``|z|``."""
 
@@ -390,7 +391,7 @@ class SectionCoordinate(QuantityAtPose):
         return SectionCoordinate, self.pose
 
 
-@dataclass(frozen=True)
+@frozen
 class SegmentAngle(Quantity):
     """Angle from the vertical (base z) of the upper arm or the forearm in the zero pose.
 
@@ -449,7 +450,7 @@ class SegmentAngle(Quantity):
         return vector
 
 
-@dataclass(frozen=True)
+@frozen
 class OfJoint(Quantity):
     """What the robot's file says of a joint besides the table; ``slides``: the joint is prismatic."""
 
@@ -472,7 +473,7 @@ class OfJoint(Quantity):
         return own * MM if self.slides else np.degrees(own)
 
 
-@dataclass(frozen=True)
+@frozen
 class Limit(OfJoint):
     """A joint's ``lower`` or ``upper`` limit."""
 
@@ -497,7 +498,7 @@ class Limit(OfJoint):
         return self.as_stated(state.lower if self.side == "lower" else state.upper)
 
 
-@dataclass(frozen=True)
+@frozen
 class Speed(OfJoint):
     """A joint's maximum speed; NaN where the robot's file gives none."""
 
@@ -520,7 +521,7 @@ class Speed(OfJoint):
         return self.as_stated(state.speed)
 
 
-@dataclass(frozen=True)
+@frozen
 class LimitExcess(QuantityAtPose):
     """How far a pose lies outside the joint limits: largest excess of a joint (mm of one that slides), 0 inside."""
 
@@ -547,7 +548,7 @@ class LimitExcess(QuantityAtPose):
         return excess
 
 
-@dataclass(frozen=True)
+@frozen
 class Extreme(Quantity):
     """Largest or smallest value of a measure of a point over all joint angles within the limits."""
 
@@ -581,7 +582,7 @@ class Extreme(Quantity):
         return np.asarray(state.extremes[self])
 
 
-@dataclass(frozen=True)
+@frozen
 class AxisDistance(Extreme):
     """The point's distance from the axis of joint 1 or 2."""
 
@@ -603,7 +604,7 @@ class AxisDistance(Extreme):
         return np.sqrt(_dot(across, across))
 
 
-@dataclass(frozen=True)
+@frozen
 class SectionExtent(Extreme):
     """The point's coordinate in the side view: joint 1 at 0, x from axis 1, z from axis 2."""
 

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from graphlib import CycleError, TopologicalSorter
 from itertools import combinations
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from er3a.by_value import Displayed, ReadOnly, Sheet
+from er3a.by_value import Displayed, ReadOnly, Sheet, frozen
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import NotOfArm, Pose, Quantity, Unit
 from er3a.references.subjects import Subject
@@ -28,7 +28,7 @@ NO_DOCUMENT = "none"
 """The origin of a value that rests on no document."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Document:
     """A document.
 
@@ -45,7 +45,7 @@ class Document:
     derived_from: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class Documents:
     """Documents by name. Any other name is a separate document, made from no other."""
 
@@ -149,7 +149,7 @@ class Documents:
 INTERVAL_95 = 1.959963984540054  # standard deviations to either side of 95 % of a normal distribution
 
 
-@dataclass(frozen=True)
+@frozen
 class Reference:
     """A scalar that a source states.
 
@@ -197,7 +197,7 @@ Scalar = tuple[Subject, str, Quantity, float | None, float]
 """Subject, group, quantity, expected value and uncertainty of a reference."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Row(ABC):
     """What every row of a reference table has: its line in the file, its source, grade and document.
 
@@ -255,7 +255,7 @@ class Row(ABC):
 RowT = TypeVar("RowT", bound=Row)
 
 
-@dataclass(frozen=True, repr=False)
+@frozen
 class ReferenceSet(Displayed):
     """All references of one folder.
 

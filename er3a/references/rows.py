@@ -8,9 +8,9 @@ words in :mod:`er3a.pipeline.messages.references`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from er3a.by_value import frozen
 from er3a.finding import fact
 from er3a.references import quantities
 from er3a.references.reference import Documents, Reference, ReferenceSet, Row, Scalar
@@ -24,7 +24,7 @@ GROUPS = {"zero_pose": 2, "axes": 3, "key_poses": 5, "reach": 1, "envelope": 4, 
 """All groups of references, in the order in which they are listed, with their rank when one failed check is quoted."""
 
 
-@dataclass(frozen=True)
+@frozen
 class AxisRow(Row):
     """The line of a joint's axis in the zero pose.
 
@@ -63,7 +63,7 @@ class AxisRow(Row):
                 )
 
 
-@dataclass(frozen=True)
+@frozen
 class PositionRow(Row):
     """Flange or wrist centre at a pose; None for coordinates, and the flange's orientation (rows of its rotation
     matrix), that aren't given. Without any, the row says only that the pose lies within the limits."""
@@ -117,7 +117,7 @@ class PositionRow(Row):
         return fact("pose_excess", pose=self.name), self.group, quantities.LimitExcess(self.pose), 0.0, POSE_SLACK_DEG
 
 
-@dataclass(frozen=True)
+@frozen
 class DirectionRow(Row):
     """Angle of an arm segment from the vertical in the zero pose: 0 upright, 90 level."""
 
@@ -147,7 +147,7 @@ ENVELOPE_EXTENTS: Mapping[str, tuple[quantities.Extremity, quantities.SectionAxi
 }
 
 
-@dataclass(frozen=True)
+@frozen
 class EnvelopeRow(Row):
     """A label of the workspace drawing: the wrist centre in the side view, x from axis 1 and z from axis 2.
 
@@ -192,7 +192,7 @@ class EnvelopeRow(Row):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class ReachRow(Row):
     """Largest or smallest distance of a point from axis 1 or 2, over all joint angles within the limits."""
 
@@ -215,7 +215,7 @@ class ReachRow(Row):
         yield subject, "reach", quantity, self.value_mm, self.uncertainty_mm
 
 
-@dataclass(frozen=True)
+@frozen
 class LimitRow(Row):
     """A joint's limits, deg, or mm of one that ``slides``; None where the source gives none."""
 
@@ -239,7 +239,7 @@ class LimitRow(Row):
             yield fact("joint_limit", joint=self.joint, side=side), "limits", quantity, expected, self.uncertainty
 
 
-@dataclass(frozen=True)
+@frozen
 class SpeedRow(Row):
     """A joint's maximum speed, deg/s, or mm/s of one that ``slides``; None where the source gives none."""
 
@@ -260,7 +260,7 @@ class SpeedRow(Row):
         yield fact("joint_speed", joint=self.joint), "speeds", quantity, self.speed, self.uncertainty
 
 
-@dataclass(frozen=True)
+@frozen
 class ObservationRow(Row):
     """Where to a point moves, or how the tool tilts or turns, while one joint is jogged in + from a pose."""
 
@@ -288,7 +288,7 @@ class ObservationRow(Row):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class LengthRow(Row):
     """A length of the table, measured on the arm: a between two axes, or d along an axis."""
 
@@ -315,7 +315,7 @@ class LengthRow(Row):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class AngleRow(Row):
     """An angle of the table, measured on the arm: alpha between two axes, or the offset at the zero mark."""
 

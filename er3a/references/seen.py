@@ -7,11 +7,12 @@ flange faces, its z axis. A turn is clockwise as seen when looking forward, up, 
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.numerics.arrays import Reals
 from er3a.references import quantities
 
@@ -38,7 +39,7 @@ STILL = 1e-9  # m/rad or 1: a motion below this is rounding, and has no directio
 PARALLEL = np.sin(np.radians(1.0))  # axes within a degree have no common normal that can be measured
 
 
-@dataclass(frozen=True)
+@frozen
 class SeenMotion(quantities.QuantityAtPose):
     """Angle between a motion while one joint is jogged in + and the direction in which it was seen; 90 if nothing
     moves."""
@@ -125,7 +126,7 @@ class SeenMotion(quantities.QuantityAtPose):
         return np.where(still, across, motion), toward
 
 
-@dataclass(frozen=True)
+@frozen
 class TableEntry(quantities.Quantity):
     """An entry of the table itself, measured by itself: a length (a, d) in mm, or an angle (alpha, offset) in deg.
 

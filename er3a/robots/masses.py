@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.errors import ShapeError
 from er3a.numerics.arrays import Reals, as_floats
 
@@ -22,7 +22,7 @@ TRIANGLE_TOLERANCE = 0.01
 NoBody = Literal["not_finite", "negative_mass", "negative_moment", "triangle"]
 
 
-@dataclass(frozen=True)
+@frozen
 class MassBody:
     """Mass, centre of mass, and inertia about that centre; axes are those of the frame in which the centre is given.
 
@@ -47,7 +47,7 @@ class MassBody:
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-@dataclass(frozen=True)
+@frozen
 class LinkMass:
     """The body of a link, in the frame on its joint's axis that moves with it, as for envelopes; link 0 is the base."""
 
@@ -55,7 +55,7 @@ class LinkMass:
     body: MassBody
 
 
-@dataclass(frozen=True)
+@frozen
 class Load(MassBody):
     """The load on the flange (centre and inertia in the flange's frame), and the wrench of the surroundings on the
     tool.
@@ -69,7 +69,7 @@ class Load(MassBody):
     moment: Three = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Drives(ByValue):
     """What is known of the joints' drives, at the joint: (n,) each, NaN where unknown; N in place of N m for prismatic
     joints.
@@ -112,7 +112,7 @@ class Drives(ByValue):
         return cls(*(np.full(joints, np.nan) for _ in fields(cls)))
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class WristLoad(ByValue):
     """What the manufacturer lets the wrist carry.
 
@@ -127,7 +127,7 @@ class WristLoad(ByValue):
     inertia: tuple[tuple[int, float], ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Masses(ByValue):
     """Everything of a robot that dynamics rests on, in addition to its table.
 

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, update_wrapper
 from pathlib import Path
 from typing import Any, Concatenate, Literal, ParamSpec, TypeVar, get_args
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, ReadOnly, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, ReadOnly, Sheet, frozen, shortly
 from er3a.errors import InputWarning, PoseError, RobotError, ShapeError
 from er3a.geometry.transforms import rot_x, rot_y, rpy_of, translation
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
@@ -32,7 +32,7 @@ GRADES: tuple[Grade, ...] = get_args(Grade)
 AUTHORITATIVE_GRADES: tuple[Grade, ...] = ("official", "measured", "cad", "export")
 
 
-@dataclass(frozen=True)
+@frozen
 class Source:
     """Where a group of values comes from, how far it can be relied on (``GRADES``), and its document, if named."""
 
@@ -41,7 +41,7 @@ class Source:
     origin: str = ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Envelope:
     """A capsule around a link, for clearance: all points within ``radius`` (m) of a line from ``start`` to ``end``.
 
@@ -60,7 +60,7 @@ class Envelope:
         _keep_shape(self, "radius", start=self.start, end=self.end)
 
 
-@dataclass(frozen=True)
+@frozen
 class CombinedLimit:
     """Limits of a sum of joints: ``lower <= factors @ q <= upper``, such as J2 + J3 of arms with a parallelogram.
 
@@ -73,7 +73,7 @@ class CombinedLimit:
     upper: float
 
 
-@dataclass(frozen=True)
+@frozen
 class ConvexPiece:
     """A convex piece of a link: all points within ``margin`` (m) of the hull of ``points`` (m, frame as of Envelope).
 
@@ -102,7 +102,7 @@ def _keep_shape(shape: Envelope | ConvexPiece, size: Literal["radius", "margin"]
     object.__setattr__(shape, size, value)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class LinkMesh(ByValue):
     """A surface of a link: points (k, 3), m, in the frame as of :class:`Envelope`, and triangles (f, 3) of them."""
 
@@ -111,7 +111,7 @@ class LinkMesh(ByValue):
     faces: Integers
 
 
-@dataclass(frozen=True)
+@frozen
 class PairRule:
     """What a person decided of a pair of bodies: not looked at (``allow``) or looked at as a whole (``watch``).
 
@@ -142,7 +142,7 @@ def slides_of(sliding: Flags, coupling: Reals | None) -> Flags:
     return np.where(coupling.diagonal() != 0, sliding[: coupling.shape[1]], moved)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Robot(ByValue, Displayed):
     """A serial arm of 1 to 10 joints. SI units; angles are in rad, arrays are read-only.
 
@@ -335,6 +335,11 @@ class Robot(ByValue, Displayed):
     def rows(self) -> int:
         """How many rows the table has, m."""
         return len(self.a)
+
+    @property
+    def joint_to_row(self) -> Reals:
+        """(m, n), the coupling, or the identity where the robot has none: ``u = joint_to_row @ q``."""
+        return np.eye(self.rows) if self.coupling is None else self.coupling
 
     @property
     def slides(self) -> Flags:

@@ -14,11 +14,11 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.vectors import TURN
 from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
 from er3a.numerics.jit import inner_kernel, kernel
@@ -31,7 +31,7 @@ INVERTIBLE = 1e-9  # smallest determinant of a coupling that is inverted
 WIDENED = (1.0, 2.0, 4.0, 8.0, 16.0)  # how far continuous joints are looked for, in halves of what turns move them by
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class WholeTurns:
     """Steps that leave the arm as it was, and all sums of them.
 
@@ -70,7 +70,7 @@ def whole_turns(robot: Robot) -> WholeTurns:
     Where a coupling moves more rows than there are joints, the lattice is made of those joints alone that a whole turn
     brings back.
     """
-    coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
+    coupling = robot.joint_to_row
     # A whole turn of a joint changes nothing if it turns each row by whole turns, and moves no row that slides.
     parts = np.where(robot.sliding[:, None], coupling, coupling - np.round(coupling))
     alone = ~robot.slides & (np.abs(parts) <= WHOLE).all(axis=0)

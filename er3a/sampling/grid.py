@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import translation
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
@@ -17,7 +16,7 @@ SECTION_REFINEMENT = 4  # the section has two dimensions, so finer cells still h
 _MARGIN = 2e-5  # the sampling loop works in single precision
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Grid:
     """Cells in the side section about axis 1.
 
@@ -36,7 +35,7 @@ class Grid:
     section_shape: tuple[int, int]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Bound:
     """A ball that joint 1 sweeps around its axis; the tool point never leaves the swept solid.
 

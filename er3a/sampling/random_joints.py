@@ -12,11 +12,10 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from er3a.by_value import frozen
 from er3a.numerics.arrays import Integers, Reals, Singles
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import within
@@ -39,7 +38,7 @@ _MASK_10, _MASK_11 = np.uint64(0x3FF), np.uint64(0x7FF)
 _HALF, _STEP = np.float32(0.5), np.float32(2.0**-21)
 
 
-@dataclass(frozen=True)
+@frozen
 class Draw:
     """How the samples of a run are drawn.
 

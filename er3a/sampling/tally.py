@@ -6,12 +6,12 @@ Memory is set by the section's cells: samples live in chunks of a few hundred th
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from er3a.by_value import by_identity, frozen
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Integers, Reals, Singles
 from er3a.numerics.jit import inner_kernel, kernel
@@ -87,7 +87,7 @@ NANOMETRES = 9  # decimals of m
 _STARTS = 8  # local searches for each extreme
 
 
-@dataclass(frozen=True)
+@frozen
 class ReachExtremes:
     """Extreme distances of the tool point from axis 1 and heights along it, above its foot; m, to the nanometre."""
 
@@ -156,7 +156,7 @@ def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[floa
     )
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class TouchedSection:
     """Cells of the side section that were touched.
 

@@ -9,10 +9,10 @@ of all joint moves decides, then the lower branch number.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.finding import Amount, Finding, fact, is_one, turned_or_moved
 from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Integers, Reals
@@ -26,7 +26,7 @@ WhyFirst = Finding
 ``lower_branch_number``."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Choice:
     """Admissible solutions, nearest first.
 

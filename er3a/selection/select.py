@@ -16,14 +16,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Real
 from typing import Literal, get_args
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, frozen, shortly
 from er3a.collision.along import bodies_of, clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
@@ -41,7 +40,7 @@ from er3a.selection.nearest import nearest, why_none
 RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Rule:
     """How a rule measures solutions.
 
@@ -221,7 +220,7 @@ NEARER = 1e-3  # deg or mm: less is no other solution to a person
 COLLIDES = 0.0  # m; a solution with less clearance is refused
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class SolutionRanking(ByValue, Displayed):
     """Solutions of one pose in the order of a rule or of a mix of rules.
 
@@ -390,7 +389,7 @@ MoveRule = Literal["nearest", "weighted", "time"]
 MOVES: tuple[MoveRule, ...] = get_args(MoveRule)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class SequenceChoice(ByValue, Displayed):
     """Solutions of a sequence of poses.
 

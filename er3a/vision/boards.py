@@ -14,14 +14,14 @@ end of a chessboard is the first can't be told from a picture; samples turned so
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, by_identity, frozen
 from er3a.errors import Er3aError
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import exp_rotation, inverse_right_jacobian, log_rotation, posed
@@ -55,7 +55,7 @@ MIN_RATIO = 2.0  # of the reprojection errors of a flat board's two poses, below
 Image = NDArray[np.uint8]
 
 
-@dataclass(frozen=True)
+@frozen
 class Board:
     """A printed board.
 
@@ -72,7 +72,7 @@ class Board:
     dictionary: str = "DICT_4X4_50"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Camera(ByValue):
     """Intrinsics: matrix (3, 3) in pixels, distortion (k,) as OpenCV has it."""
 
@@ -80,7 +80,7 @@ class Camera(ByValue):
     distortion: Reals
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class BoardViews(ByValue):
     """What was found in images.
 
@@ -380,7 +380,7 @@ def _detector(board: Board) -> Any:
 _NOTHING: tuple[Reals, Reals] = (np.empty((0, 3)), np.empty((0, 2)))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Pose:
     """A board in an image.
 

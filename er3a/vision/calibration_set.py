@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.by_value import ByValue, Displayed, Sheet, frozen
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import check_poses, inverted, step_between
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -20,7 +20,7 @@ OpenFrame = Literal["flange_frame", "base_frame"]
 """What recorded poses may not be: the flange's, and in the robot's own base."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class CalibrationSet(ByValue, Displayed):
     """Samples of one board seen by one camera. Lengths in m, angles in rad.
 

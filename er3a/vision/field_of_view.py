@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.numerics.arrays import Flags, Reals
 
 
-@dataclass(frozen=True)
+@frozen
 class FieldOfView:
     """What the camera sees.
 

@@ -10,12 +10,12 @@ straight moves of the joints. Clearance is proven along each leg as it is run (:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.collision.along import RateBounds, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
@@ -40,7 +40,7 @@ MIN_DURATION = 0.05  # s
 CHECKS = 41  # times of a leg at which it is solved and measured first; both are refined from there
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class GraspLeg:
     """A part of the way from halt to halt.
 

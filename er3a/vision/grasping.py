@@ -12,11 +12,12 @@ The object and what is held are not bodies of the scene; the arm, its tool's cap
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.finding import Amount, Finding, fact
@@ -42,7 +43,7 @@ PLANNING_TOLERANCE = 1e-3  # m
 TIE = 6  # decimals: turns of a symmetrical object tie, and rounding of another processor must not choose
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Grasp:
     """A way to hold an object: T_object_tool (4, 4), the tool's z axis being its direction of approach."""
 
@@ -50,7 +51,7 @@ class Grasp:
     T_object_tool: Reals
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class DetectedObject:
     """What a camera reports.
 
@@ -70,7 +71,7 @@ class DetectedObject:
     retreat: float
 
 
-@dataclass(frozen=True)
+@frozen
 class GraspNeeds:
     """The requirements of a grasp.
 
@@ -95,7 +96,7 @@ _FAR = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ChosenGrasp:
     """A grasp that the arm can carry out.
 
@@ -126,7 +127,7 @@ class ChosenGrasp:
     deviation: float
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class GraspPlan:
     """What becomes of an object: a grasp, or why none; counts of poses, solutions, and those followed.
 
@@ -141,7 +142,7 @@ class GraspPlan:
     error: SeenPoseError | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Candidate:
     grasp: str
     turn: float
@@ -149,7 +150,7 @@ class _Candidate:
     q: Reals
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class GraspTask:
     """What all objects share.
 

@@ -19,13 +19,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
 from scipy.spatial.transform import Rotation
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, frozen, shortly
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import (
     inverted,
@@ -67,7 +67,7 @@ BOARD_TURNS = {  # axis of the board, and deg
 MEND_KINDS = (*BOARD_TURNS, "mirrored_tilt")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class AngleCheck(ByValue):
     """What the rotation angles show.
 
@@ -336,7 +336,7 @@ CONTRADICTED = 1e-3  # probability of touched points as far off, below which the
 MAX_FACTS = 10  # findings that a notebook shows
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class TouchCheck(ByValue):
     """Points touched with the robot, held out of the calibration, against where the camera puts them.
 
@@ -369,7 +369,7 @@ class TouchCheck(ByValue):
         return float(np.linalg.norm(self.difference, axis=1).max())
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class HandEye(ByValue, Displayed):
     """A calibration.
 

@@ -25,12 +25,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, partial
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.calibration.clustered import clustered_covariance
 from er3a.geometry.transforms import frame_along, inverse_right_jacobian, log_rotation, moved, skew, transposed
 from er3a.numerics.arrays import Reals
@@ -55,7 +56,7 @@ Model = Callable[[Reals, Reals, Reals], tuple[Reals, Reals]]
 """From X, Y (4, 4) and k more unknowns (k,) to residuals (N, 6) and their derivatives (N, 6, 12 + k)."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Refined:
     """The likeliest hand-eye and board poses of N samples, with k more unknowns if a model has some.
 
@@ -248,7 +249,7 @@ def _fit(seen: CalibrationSet, model: Model, W: Reals, start: tuple[Reals, Reals
     return fit
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Noise:
     """The noise of boards that are seen at B (N, 4, 4): standard deviations (4,) by :data:`GROUPS`,
     independent at a point of the board (3,), m."""

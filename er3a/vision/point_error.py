@@ -7,11 +7,11 @@ any setup where the tool goes. That a table's error has already bent the calibra
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.calibration.parameters import corrected
 from er3a.comparison.entries import entries_in
 from er3a.geometry.transforms import skew, step_between
@@ -26,7 +26,7 @@ ISO_DEVIATIONS = 3.0  # ISO 9283: RP is the mean distance from the mean place pl
 TABLE_STEP = 1e-6  # m or rad, of one-sided differences
 
 
-@dataclass(frozen=True)
+@frozen
 class ArmAccuracy:
     """What is stated of an arm.
 
@@ -49,7 +49,7 @@ class ArmAccuracy:
         return self.repeatability / float(2 * np.sqrt(2 / np.pi) + ISO_DEVIATIONS * np.sqrt(3 - 8 / np.pi))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SeenPoseError:
     """Covariances (..., 6, 6) of a pose in the base frame, position (m) and rotation (rad), by cause and in all."""
 

@@ -16,12 +16,13 @@ tried.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.calibration.parameters import DEPENDENT
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import inverted, moved, step_between
@@ -55,7 +56,7 @@ ZERO_CHANCE = 1e-4  # of sound sets in which a zero is called wrong
 MIN_ZERO = np.radians(0.5)  # below which a joint's zero is not named
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class TypicalCause:
     """A change of all samples.
 
@@ -166,7 +167,7 @@ MATRICES: dict[str, Reals] = {
 """D of each."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class DistanceFit:
     """An error of distances that the samples don't exclude, and their fit with it.
 
@@ -321,7 +322,7 @@ def _step_at(samples: CalibrationSet, what: str, at: int) -> TypicalCause:
 # Zeros ----------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ZerosTried:
     """What became of the zeros of joints.
 

@@ -17,10 +17,9 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.kinematics.block_inverse import BlockConstants
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, wrist_partition_missing
 from er3a.numerics.arrays import Flags, Reals
@@ -35,7 +34,7 @@ from er3a.workspace.tool_inverse import all_solutions, generic_manipulability, s
 _POSES = 50_000  # solved at a time, so that their solutions stay within some hundred megabytes
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Capability:
     """Numbers per cell and sector of azimuth (part of a bar), both (n, sectors); a full turn of joint 1 makes one.
 
@@ -53,7 +52,7 @@ class Capability:
     manipulability: Reals
 
 
-@dataclass(frozen=True)
+@frozen
 class Overall:
     """Figures over all reached cells: means by volume, the best of any cell, manipulability in m^3."""
 

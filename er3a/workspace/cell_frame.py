@@ -6,10 +6,9 @@ joint 1 moved, within its limits.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import LockedJoint
@@ -28,7 +27,7 @@ _FEW_SECTORS = 16
 """The same of arms whose inverse takes long."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class CellFrame:
     """Where cells lie.
 
@@ -207,5 +206,4 @@ def places_served(robot: Robot, q_1: Reals) -> tuple[Reals, Reals]:
 
 def _sense(robot: Robot) -> float:
     """The sense in which joint 1 moves along its axis or slide, +1 or -1."""
-    sense = robot.direction[0] * (1.0 if robot.coupling is None else robot.coupling[0, 0])
-    return float(np.sign(sense))
+    return float(np.sign(robot.direction[0] * robot.joint_to_row[0, 0]))

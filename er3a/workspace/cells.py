@@ -7,12 +7,13 @@ whole. With a limited joint 1 it is filled over some arcs of azimuth, empty over
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import by_identity
 from er3a.geometry.vectors import TURN
 from er3a.numerics.arrays import Integers, Reals
 
@@ -22,7 +23,7 @@ MAX_LEVEL = 7
 _ARRAYS = "cells", "unfilled", "empty", "level"
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Proof:
     """Cells that tile the half plane's rectangle, each a ring about axis 1, and what is known of its azimuths.
 

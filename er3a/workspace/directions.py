@@ -7,10 +7,9 @@ reached without asking joint 6 (*free roll*). Any other tool moves the wrist whe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
@@ -20,7 +19,7 @@ _ON_AXIS = 1e-12  # m, and sine of an angle: rounding of tables that are exact
 RING = np.radians(10)  # rings of a cone are at most this far from each other
 
 
-@dataclass(frozen=True)
+@frozen
 class Roll:
     """How the roll about the tool's direction is treated.
 
@@ -65,7 +64,7 @@ def _last_turns_alone(robot: Robot) -> bool:
     if robot.sliding[-1] or any(limit.factors[last] for limit in robot.combined):
         return False
     alone = np.eye(robot.rows, robot.joints)
-    coupling = alone if robot.coupling is None else robot.coupling
+    coupling = robot.joint_to_row
     return np.array_equal(coupling[-1], alone[-1]) and np.array_equal(coupling[:, last], alone[:, last])
 
 

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.vectors import Vector
+from er3a.geometry.vectors import Vector, add, cross, in_frame_of, subtract
 from er3a.kinematics.chain import constant_links, joint_starts, moving_tip
+from er3a.kinematics.forward import slide_row, step_row, turn_row
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import theta_limits
@@ -104,8 +105,7 @@ def general_arm(robot: Robot) -> tuple[GeneralArm, Reals, Reals]:
     lower, upper = ends.T.copy()
     drive, start, v_lower, v_upper = np.eye(n), np.zeros(n), lower, upper
     if coupled(robot):
-        coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        drive = np.ascontiguousarray((robot.direction[:, None] * coupling)[:n])
+        drive = np.ascontiguousarray((robot.direction[:, None] * robot.joint_to_row)[:n])
         start, v_lower, v_upper = joint_starts(robot)[:n].copy(), robot.lower.copy(), robot.upper.copy()
     combined = np.array([limit.factors for limit in robot.combined]).reshape(-1, drive.shape[1])
     sums = np.array([[limit.lower, limit.upper] for limit in robot.combined]).reshape(-1, 2).T.copy()
@@ -194,7 +194,7 @@ def _levers(links: Reals, tip: Reals, sliding: Flags, lower: Reals, upper: Reals
 
 
 @kernel
-def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Reals) -> Vector:
+def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals) -> Vector:
     """The tool point for one joint vector, with levers and derivatives. Kernel.
 
     Parameters
@@ -202,37 +202,26 @@ def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Re
     theta : (n,), rad or m
     radii : (n,), filled with the point's distance from each axis, m; 1 for prismatic joints
     columns : (n, 3), filled with the derivative of the point by each value, m
-    frame : (3, 4), working memory
 
     Returns
     -------
     x, y, z : m, in the frame of joint 1 before it moves
     """
-    n = theta.shape[0]
-    x, y, z = point_of(arm, theta, radii)
-    frame[:] = 0.0
-    frame[0, 0], frame[1, 1], frame[2, 2] = 1.0, 1.0, 1.0
-    for k in range(n):
+    point = point_of(arm, theta, radii)
+    x, y, z = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)
+    for k in range(theta.shape[0]):
         if k > 0:
             L = arm.links[k]
-            for r in range(3):
-                a, b, c, d = frame[r, 0], frame[r, 1], frame[r, 2], frame[r, 3]
-                for j in range(4):
-                    frame[r, j] = a * L[0, j] + b * L[1, j] + c * L[2, j]
-                frame[r, 3] += d
-        wx, wy, wz = frame[0, 2], frame[1, 2], frame[2, 2]
+            x, y, z = step_row(x, L), step_row(y, L), step_row(z, L)
+        axis = x[2], y[2], z[2]
         if arm.sliding[k]:
-            columns[k, 0], columns[k, 1], columns[k, 2] = wx, wy, wz
-            for r in range(3):
-                frame[r, 3] += theta[k] * frame[r, 2]
+            columns[k, 0], columns[k, 1], columns[k, 2] = axis
+            x, y, z = slide_row(x, theta[k]), slide_row(y, theta[k]), slide_row(z, theta[k])
             continue
-        px, py, pz = x - frame[0, 3], y - frame[1, 3], z - frame[2, 3]
-        columns[k, 0], columns[k, 1], columns[k, 2] = wy * pz - wz * py, wz * px - wx * pz, wx * py - wy * px
+        columns[k, 0], columns[k, 1], columns[k, 2] = cross(axis, subtract(point, (x[3], y[3], z[3])))
         c, s = np.cos(theta[k]), np.sin(theta[k])
-        for r in range(3):
-            a, b = frame[r, 0], frame[r, 1]
-            frame[r, 0], frame[r, 1] = a * c + b * s, b * c - a * s
-    return x, y, z
+        x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
+    return point
 
 
 @inner_kernel
@@ -259,11 +248,7 @@ def point_of(arm: GeneralArm, theta: Reals, radii: Reals) -> Vector:
             x, y = c * x - s * y, s * x + c * y
         if k > 0:
             L = arm.links[k]
-            x, y, z = (
-                L[0, 0] * x + L[0, 1] * y + L[0, 2] * z + L[0, 3],
-                L[1, 0] * x + L[1, 1] * y + L[1, 2] * z + L[1, 3],
-                L[2, 0] * x + L[2, 1] * y + L[2, 2] * z + L[2, 3],
-            )
+            x, y, z = add(in_frame_of(L, (x, y, z)), (L[0, 3], L[1, 3], L[2, 3]))
     return x, y, z
 
 

@@ -72,7 +72,6 @@ class Memory(NamedTuple):
     theta: Reals
     radii: Reals
     columns: Reals
-    frame: Reals
     slopes: Reals  # (3, m): radius, height and offset across the arm's plane by each value
     weights: Reals
     directions: Reals  # (2, m)
@@ -119,7 +118,6 @@ def memory(arm: GeneralArm) -> Memory:
         np.empty(n),
         np.empty(n),
         np.empty((n, 3)),
-        np.empty((3, 4)),
         np.empty((3, m)),
         np.empty(m),
         np.empty((2, m)),
@@ -213,7 +211,7 @@ def sample(arm: GeneralArm, unit: Reals, known: Postures, memory: Memory) -> Non
 def _slopes(arm: GeneralArm, memory: Memory) -> tuple[float, float, float]:
     """Radius, height (m) and azimuth (rad) at ``memory.v``, their slopes and the weights of the joints."""
     _values(arm, memory.v, memory.theta)
-    x, y, z = place(arm, memory.theta, memory.radii, memory.columns, memory.frame)
+    x, y, z = place(arm, memory.theta, memory.radii, memory.columns)
     rho = _radius(arm, x, y)
     ux, uy = (x / rho, y / rho) if rho > 0.0 and arm.bar == 0.0 else (1.0, 0.0)
     n, m = arm.drive.shape
@@ -351,7 +349,7 @@ def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float,
     """
     n = arm.drive.shape[0]
     _values(arm, memory.v, memory.theta)
-    x, y, _ = place(arm, memory.theta, memory.radii, memory.columns, memory.frame)
+    x, y, _ = place(arm, memory.theta, memory.radii, memory.columns)
     rho = np.hypot(x, y)
     if arm.bar == 0.0 and (rho <= 0.0 or cell[0] <= 0.0):
         return False, 0.0, 0.0
@@ -391,7 +389,7 @@ def _covers_axis(arm: GeneralArm, cell: Cell, memory: Memory) -> bool:
         return False
     for _ in range(_STEPS):
         _slopes(arm, memory)
-        miss = subtract((0.0, 0.0, z), place(arm, memory.theta, memory.radii, columns, memory.frame))
+        miss = subtract((0.0, 0.0, z), place(arm, memory.theta, memory.radii, columns))
         # Rows of J W J^T, with the joints' weights W.
         rows = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         for j in range(m):
@@ -434,7 +432,7 @@ def _column(arm: GeneralArm, columns: Reals, j: int) -> Vector:
     """Derivative (m) of the point by a joint value, joint 1 at rest."""
     total = (0.0, 0.0, 0.0)
     for k in range(1, columns.shape[0]):
-        total = add(total, scaled((columns[k, 0], columns[k, 1], columns[k, 2]), arm.drive[k, j]))
+        total = add(total, scaled(columns[k], arm.drive[k, j]))
     return total
 
 

@@ -8,12 +8,12 @@ are tested, for an arm of three joints only *points*.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from er3a.by_value import by_identity
+from er3a.geometry.transforms import exp_rotation
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.by_class import arm_solver, with_task_frame
 from er3a.kinematics.chain import axes_at_zero_theta
@@ -28,7 +28,7 @@ _MIN_PLANAR = 3  # joints that place the tool in a plane and tilt it there
 _TASK_TURNS = 36  # about a SCARA's axes, one for each 10 deg
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class TiltPlane:
     """The plane that the tool points within, with joint 1 at theta 0, in the base frame.
 
@@ -100,7 +100,7 @@ class TiltPlane:
         rotations : (n, asked, 2, 3, 3), of the plane's two turns
         """
         turns = self.turns(points)
-        frames = Rotation.from_rotvec(np.nan_to_num(turns).reshape(-1, 1) * self.axis).as_matrix()
+        frames = exp_rotation(np.nan_to_num(turns).reshape(-1, 1) * self.axis)
         normal, up = frames @ self.normal, frames @ self.up
         aside = float(self.tool[:, 2] @ self.normal)
         x, y = up @ axis, np.cross(normal, up) @ axis
@@ -115,14 +115,14 @@ class TiltPlane:
     def _rotations(self, turns: Reals, tilts: Reals) -> Reals:
         """Orientations (..., 3, 3) of the tool at turns and tilts (rad, of one shape); out of the plane where NaN."""
         none = np.isnan(turns) | np.isnan(tilts)
-        about_1 = Rotation.from_rotvec(np.where(none, 0.0, turns).reshape(-1, 1) * self.axis).as_matrix()
-        about_2 = Rotation.from_rotvec(np.where(none, 0.0, tilts - self.tilt).reshape(-1, 1) * self.normal).as_matrix()
+        about_1 = exp_rotation(np.where(none, 0.0, turns).reshape(-1, 1) * self.axis)
+        about_2 = exp_rotation(np.where(none, 0.0, tilts - self.tilt).reshape(-1, 1) * self.normal)
         found = (about_1 @ about_2 @ self.tool).reshape(*turns.shape, 3, 3)
         found[none] = tool_rotations((0.8 * self.normal + 0.6 * self.up)[None], Roll(True, (0.0,)))[0, 0]
         return np.asarray(found)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class AskedOrientations:
     """The required tool orientations: their kind, how the roll is treated, and the zero of turns and tilts.
 
@@ -177,7 +177,7 @@ class AskedOrientations:
 
     def _about_axis(self, turns: Reals) -> Reals:
         """The tool turned about the axis by angles (n,), rad: (n, 3, 3)."""
-        return np.asarray(Rotation.from_rotvec(turns[:, None] * self.axis).as_matrix() @ self.tool)
+        return exp_rotation(turns[:, None] * self.axis) @ self.tool
 
 
 def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:

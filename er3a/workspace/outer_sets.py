@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.vectors import TURN
+from er3a.geometry.vectors import TURN, in_frame_of
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.arcs import FULL_TURN, ROUND_OFF, Cell, remove
@@ -192,17 +192,14 @@ def _spread(L: Reals, cell: Cell, turns: Reals, at: int, bar: float) -> tuple[Fo
     sag, d_turn = cell[1] * turns[at, 4], cell[1] * turns[at, 5]
     if bar > 0.0:
         c, s, along_bar, sag, d_turn = 1.0, 0.0, bar * turns[at, 0] / TURN, 0.0, bar * turns[at, 3] / TURN
-    x, y, height = rho * c - L[0, 3], rho * s + along_bar - L[1, 3], z - L[2, 3]
-    px = L[0, 0] * x + L[1, 0] * y + L[2, 0] * height
-    py = L[0, 1] * x + L[1, 1] * y + L[2, 1] * height
-    pz = L[0, 2] * x + L[1, 2] * y + L[2, 2] * height
+    px, py, pz = in_frame_of(L.T, (rho * c - L[0, 3], rho * s + along_bar - L[1, 3], z - L[2, 3]))
     d_rho, d_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
     inwards = d_rho + sag
     rho_there = np.sqrt(px * px + py * py)
     ux, uy = (px / rho_there, py / rho_there) if rho_there > 0.0 else (1.0, 0.0)
     # Radial, tangential and upward directions of the cell, in the frame after the link.
-    rx, ry, rz = L[0, 0] * c + L[1, 0] * s, L[0, 1] * c + L[1, 1] * s, L[0, 2] * c + L[1, 2] * s
-    tx, ty, tz = L[1, 0] * c - L[0, 0] * s, L[1, 1] * c - L[0, 1] * s, L[1, 2] * c - L[0, 2] * s
+    rx, ry, rz = in_frame_of(L.T, (c, s, 0.0))
+    tx, ty, tz = in_frame_of(L.T, (-s, c, 0.0))
     vx, vy, vz = L[2, 0], L[2, 1], L[2, 2]
     along = abs(ux * rx + uy * ry) * inwards + abs(ux * tx + uy * ty) * d_turn + abs(ux * vx + uy * vy) * d_z
     aside = abs(ux * ry - uy * rx) * inwards + abs(ux * ty - uy * tx) * d_turn + abs(ux * vy - uy * vx) * d_z

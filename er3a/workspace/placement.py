@@ -14,7 +14,7 @@ A supported box has its underside on a :class:`Support`, over which all of it li
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ import scipy
 import scipy.optimize
 from numpy.typing import NDArray
 
+from er3a.by_value import by_identity
 from er3a.collision.scene import Box, Cylinder, Plane, Scene
 from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -44,7 +45,7 @@ Free = Callable[[Reals], Flags]
 """Which arms (N, n), rad, are free of collisions, (N,)."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Support:
     """A level surface of a scene that can support a box.
 
@@ -134,7 +135,7 @@ def _outline(solid: Box | Cylinder, upright: int) -> Reals:
     return corners if a[0] * b[1] - a[1] * b[0] > 0 else corners[::-1]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Task:
     """The task, in the frame that the robot's base is placed in.
 
@@ -213,7 +214,7 @@ def _drawn_in(limit: CombinedLimit, margin: float) -> CombinedLimit:
     return CombinedLimit(limit.factors, limit.lower + inward, limit.upper - inward)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Field:
     """Lattice points and how well each serves the task.
 
@@ -234,7 +235,7 @@ class Field:
     limit_margin: Reals
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Places:
     """Boxes whose lattice points are all good, one row each, the best first.
 
@@ -557,7 +558,7 @@ def _sliding_min(values: Reals, points: Integers) -> Reals:
     return values
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class BoxPlacement:
     """Where a box can be placed: the lattice, the places on it, and the rows of the best that don't overlap."""
 

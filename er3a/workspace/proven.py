@@ -8,13 +8,13 @@ its proven empty part and all of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from er3a.by_value import by_identity
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -118,7 +118,7 @@ def holds_azimuth(arcs: Reals, azimuth: Reals) -> Flags:
     return np.asarray(((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Cavity:
     """A connected set of arcs.
 
@@ -272,7 +272,7 @@ SETTLED = 0.1  # of the volume
 CELLS = 4  # looked at for each one of the budget: they are cheap
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Proven:
     """What the proof says of a robot.
 

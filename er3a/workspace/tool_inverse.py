@@ -8,9 +8,9 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from er3a.finding import Finding, fact
+from er3a.geometry.transforms import exp_rotation
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import (
@@ -118,7 +118,7 @@ def redundancy_values(robot: Robot) -> Reals | None:
         return None
     count = max(2, round(ARM_ANGLES ** (1 / len(parameters))))
     each = []
-    endless = robot.continuous if robot.coupling is None else (robot.coupling[:, robot.continuous] != 0).any(axis=1)
+    endless = (robot.joint_to_row[:, robot.continuous] != 0).any(axis=1)
     for parameter in parameters:
         j = parameter.joint
         if j < 0:
@@ -180,7 +180,7 @@ def _solutions(robot: Robot, T: Reals, redundancy: Reals | None) -> tuple[Reals,
     left = np.flatnonzero(slots.certainty != CERTAIN)
     if left.size:
         beside = T[left].copy()
-        beside[:, :3, :3] = beside[:, :3, :3] @ Rotation.from_rotvec(BESIDE).as_matrix()
+        beside[:, :3, :3] = beside[:, :3, :3] @ exp_rotation(BESIDE)
         again = slots_of_class(robot, beside, reference, values[left], settling=False)
         more = again.inside.sum(axis=1) > slots.inside[left].sum(axis=1)
         slots.q[left[more]], slots.inside[left[more]] = again.q[more], again.inside[more]

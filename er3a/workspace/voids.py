@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -20,7 +20,7 @@ _CUBE = np.ones((3, 3, 3), dtype=bool)  # what a pocket must hold somewhere, in 
 MIN_BLOCKS = 8  # of a pocket: fewer are too small to say anything of
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Blocks:
     """A regular grid.
 
@@ -230,7 +230,7 @@ MESH_BLOCKS, MESH_TURNS = 24, 72  # across a void and around, for its picture
 _SPECK_M3 = 1e-9  # 1 mm^3: smaller voids are not listed
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Void:
     """A void, in the base frame.
 

@@ -144,8 +144,8 @@ def test_the_chain_gives_what_forward_and_jacobian_give(random, robot):
     n = len(arm.lower)
     for q in random.uniform(robot.lower, robot.upper, (20, robot.joints)):
         theta = (robot.direction * q + joint_starts(robot))[:n]
-        radii, columns, frame = np.empty(n), np.empty((n, 3)), np.empty((3, 4))
-        point = np.array(place(arm, theta, radii, columns, frame))
+        radii, columns = np.empty(n), np.empty((n, 3))
+        point = np.array(place(arm, theta, radii, columns))
         assert point @ R + origin == pytest.approx(forward(robot, q)[:3, 3], abs=1e-12)
         expected = jacobian(robot, q)[:3, :n] * robot.direction[:n]
         assert np.abs(R.T @ columns.T - expected).max() < 1e-12

@@ -21,19 +21,17 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import frame_along, rot_x, rot_z
-from er3a.geometry.vectors import TURN, Vector, dot, in_frame_of
+from er3a.geometry.vectors import TURN, Rows, Vector, add, cross, dot, in_frame_of, scaled, subtract
 from er3a.kinematics.chain import axes_of, meeting_point, poses_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel
-
-Rows = tuple[Vector, Vector, Vector]
 
 
 class SphericalConstants(NamedTuple):
@@ -227,7 +225,7 @@ class ArmAngleConstants(NamedTuple):
     zero_4: float
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ArmAngleArm:
     """The solver of one arm: its links (8, 4, 4) and constants."""
 
@@ -408,35 +406,27 @@ def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, s
     shortest = ONE_POINT * (k.upper_arm + k.lower_arm)
     for i in range(BLOCK):
         m = start + min(i, size - 1)
-        vx, vy, vz = in_frame_of(T[m], t)
-        vx, vy, vz = vx + T[m, 0, 3] - u[0], vy + T[m, 1, 3] - u[1], vz + T[m, 2, 3] - u[2]
-        distance = np.sqrt(vx * vx + vy * vy + vz * vz)
+        v = subtract(add(in_frame_of(T[m], t), (T[m, 0, 3], T[m, 1, 3], T[m, 2, 3])), u)
+        distance = np.sqrt(dot(v, v))
         one_point = distance < shortest
-        per = 1.0 / (1.0 if one_point else distance)
-        nx, ny, nz = vx * per, vy * per, vz * per
-        nx, ny, nz = across[0] if one_point else nx, across[1] if one_point else ny, across[2] if one_point else nz
-        r = k.reference
-        ax, ay, az = ny * r[2] - nz * r[1], nz * r[0] - nx * r[2], nx * r[1] - ny * r[0]
-        along = ax * ax + ay * ay + az * az < ALONG * ALONG
-        rx, ry, rz = across[0] if along else r[0], across[1] if along else r[1], across[2] if along else r[2]
+        n = across if one_point else scaled(v, 1.0 / distance)
+        a = cross(n, k.reference)
+        r = across if dot(a, a) < ALONG * ALONG else k.reference
         # e = cos r + sin n x r with r made perpendicular; n x r once more, because a short one is not across n
-        ax, ay, az = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
-        over = ax * nx + ay * ny + az * nz
-        ax, ay, az = ax - over * nx, ay - over * ny, az - over * nz
-        per = 1.0 / np.sqrt(ax * ax + ay * ay + az * az)
-        ax, ay, az = ax * per, ay * per, az * per
-        bx, by, bz = ay * nz - az * ny, az * nx - ax * nz, ax * ny - ay * nx
+        a = cross(n, r)
+        a = subtract(a, scaled(n, dot(a, n)))
+        a = scaled(a, 1.0 / np.sqrt(dot(a, a)))
         c, s = cos_sin(psi[m])
-        ex, ey, ez = c * bx + s * ax, c * by + s * ay, c * bz + s * az
-        fx, fy, fz = ny * ez - nz * ey, nz * ex - nx * ez, nx * ey - ny * ex
+        e = add(scaled(cross(a, n), c), scaled(a, s))
+        f = cross(n, e)
         for row in range(3):
-            w[row * BLOCK + i] = dot(k.base[row], (nx, ny, nz))
-            w[(3 + row) * BLOCK + i] = dot(k.base[row], (ex, ey, ez))
-            w[(6 + row) * BLOCK + i] = dot(k.base[row], (fx, fy, fz))
+            w[row * BLOCK + i] = dot(k.base[row], n)
+            w[(3 + row) * BLOCK + i] = dot(k.base[row], e)
+            w[(6 + row) * BLOCK + i] = dot(k.base[row], f)
         z, x = in_frame_of(T[m], k.axis_7_in_tool), in_frame_of(T[m], k.beside_7_in_tool)
-        w[9 * BLOCK + i], w[12 * BLOCK + i] = dot((nx, ny, nz), z), dot((nx, ny, nz), x)
-        w[10 * BLOCK + i], w[13 * BLOCK + i] = dot((ex, ey, ez), z), dot((ex, ey, ez), x)
-        w[11 * BLOCK + i], w[14 * BLOCK + i] = dot((fx, fy, fz), z), dot((fx, fy, fz), x)
+        w[9 * BLOCK + i], w[12 * BLOCK + i] = dot(n, z), dot(n, x)
+        w[10 * BLOCK + i], w[13 * BLOCK + i] = dot(e, z), dot(e, x)
+        w[11 * BLOCK + i], w[14 * BLOCK + i] = dot(f, z), dot(f, x)
         w[37 * BLOCK + i] = distance
         w[38 * BLOCK + i] = 1.0 if distance < NEAR else 0.0
 
@@ -465,17 +455,15 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
         x = (k.lower_arm - k.upper_arm) - 2.0 * k.lower_arm * near * per
         y, h = 2.0 * sign * k.lower_arm * root_far * root_near * per, k.height
         length = np.sqrt(x * x + y * y + h * h)
-        one_point = length < ONE_POINT * reach
-        per = 1.0 / (1.0 if one_point else length)
-        x, y, h = x * per, sign if one_point else y * per, h * per
-        length = np.sqrt(x * x + y * y)
+        x, y, h = (x, sign, h) if length < ONE_POINT * reach else scaled((x, y, h), 1.0 / length)
+        n, length = (x, y, h), np.sqrt(x * x + y * y)
         beside = length < ONE_POINT  # axis 4 along S W
         per = sign / (1.0 if beside else length)
-        ex, ey = -sign if beside else -y * per, x * per
-        fx, fy, fz = -h * ey, h * ex, x * ey - y * ex
+        e = -sign if beside else -y * per, x * per, 0.0
+        f = cross(n, e)
         for vector in range(2):
-            v0, v1, v2 = k.axis_3 if vector == 0 else k.beside_3
-            a, b, d = x * v0 + y * v1 + h * v2, ex * v0 + ey * v1, fx * v0 + fy * v1 + fz * v2
+            v = k.axis_3 if vector == 0 else k.beside_3
+            a, b, d = dot(n, v), dot(e, v), dot(f, v)
             for row in range(3):
                 w[(24 + 3 * vector + row) * BLOCK + i] = (
                     w[row * BLOCK + i] * a + w[(3 + row) * BLOCK + i] * b + w[(6 + row) * BLOCK + i] * d
@@ -485,7 +473,7 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
                 w[(10 + 3 * vector) * BLOCK + i],
                 w[(11 + 3 * vector) * BLOCK + i],
             )
-            p0, p1, p2 = a * x + b * ex + d * fx, a * y + b * ey + d * fy, a * h + d * fz
+            p0, p1, p2 = add(add(scaled(n, a), scaled(e, b)), scaled(f, d))
             # undone: joint 4, about the elbow's third direction
             ct, st = cos_sin(theta)
             p0, p1 = p0 * ct + p1 * st, p1 * ct - p0 * st
@@ -505,7 +493,7 @@ def three_angles(k: SphericalConstants, w: Reals, row: int, sign: float, out: Re
     """
     spherical_triangles(k, w, row, sign, out)
     for i in range(BLOCK):
-        smallest = min(min(out[4 * BLOCK + i], out[5 * BLOCK + i]), out[6 * BLOCK + i])
+        smallest = min(out[4 * BLOCK + i], out[5 * BLOCK + i], out[6 * BLOCK + i])
         one = 1.0 if smallest > -1e-12 else np.nan
         a, b = arctan2(out[BLOCK + i], out[i]) - k.zero_1, out[2 * BLOCK + i] - k.zero_2
         out[i] = (a - TURN * np.ceil(a * (1.0 / TURN) - 0.5)) * one

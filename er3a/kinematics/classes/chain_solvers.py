@@ -9,11 +9,11 @@ by added joints; their axes are stated.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import frame_along, inverted
 from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes import class_solvers
@@ -30,7 +30,7 @@ FULL_RANK = 1e-7  # smallest singular value at some of a few random joint values
 PREFERENCE = tuple(class_solvers.ARM_CLASSES)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LockedJoint(class_solvers.ChainSolver):
     """More than six joints, one of which is held at a value; ``rest`` solves the others. Self-motions are collected
     over the value."""
@@ -110,7 +110,7 @@ class LockedJoint(class_solvers.ChainSolver):
         return self.rest.names(np.delete(x, self.joint)) if self.rest is not None else ()
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Unsolved(class_solvers.ChainSolver):
     """A chain for which nothing here knows all solutions."""
 

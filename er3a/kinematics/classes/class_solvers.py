@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import by_identity, frozen
 from er3a.geometry.transforms import exp_rotation
 from er3a.geometry.vectors import Vector, wrap_to_pi
 from er3a.kinematics.chain import axes_of, poses_of, size_of
@@ -44,20 +45,18 @@ ArmClassCode = Literal[
 ]
 
 
-@dataclass(frozen=True)
+@frozen
 class ArmClassTraits:
     """What is known of a class, in addition to its solver.
 
     Attributes
     ----------
-    closed_form : whether its solutions come without elimination or search
-    eliminates : whether they come by elimination, where rounding may lose some
+    closed_form : whether its solutions come without elimination, where rounding may lose some, and without search
     searched : whether a pose in doubt is searched for self-motions from many starts
     task : which of x, y, z and the rotations about x, y, z of the tool's frame its solutions meet
     """
 
     closed_form: bool = False
-    eliminates: bool = False
     searched: bool = False
     task: tuple[int, int, int, int, int, int] = (1, 1, 1, 1, 1, 1)
 
@@ -67,14 +66,14 @@ ARM_CLASSES: dict[ArmClassCode, ArmClassTraits] = {
     "three_parallel": ArmClassTraits(closed_form=True),
     "arm_angle": ArmClassTraits(closed_form=True),
     "gantry": ArmClassTraits(closed_form=True, searched=True),
-    "general_six": ArmClassTraits(eliminates=True, searched=True),
-    "six_two_prismatic": ArmClassTraits(eliminates=True, searched=True),
-    "six_one_prismatic": ArmClassTraits(eliminates=True, searched=True),
+    "general_six": ArmClassTraits(searched=True),
+    "six_two_prismatic": ArmClassTraits(searched=True),
+    "six_one_prismatic": ArmClassTraits(searched=True),
     "scara": ArmClassTraits(closed_form=True, searched=True, task=(1, 1, 1, 0, 0, 1)),
-    "redundant": ArmClassTraits(eliminates=True),
-    "free_roll": ArmClassTraits(eliminates=True, searched=True, task=(1, 1, 1, 1, 1, 0)),
-    "planar_wrist": ArmClassTraits(eliminates=True, searched=True),
-    "position": ArmClassTraits(eliminates=True, searched=True, task=(1, 1, 1, 0, 0, 0)),
+    "redundant": ArmClassTraits(),
+    "free_roll": ArmClassTraits(searched=True, task=(1, 1, 1, 1, 1, 0)),
+    "planar_wrist": ArmClassTraits(searched=True),
+    "position": ArmClassTraits(searched=True, task=(1, 1, 1, 0, 0, 0)),
     "dependent": ArmClassTraits(),
     "unsolved": ArmClassTraits(),
 }
@@ -127,7 +126,7 @@ DOUBLE_ROOT = 1e-6  # rad or m: rows so near are one, split by rounding
 NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
 
 
-@dataclass(frozen=True)
+@frozen
 class Redundancy:
     """What a pose leaves open in chains of seven and more: a joint (from 0), or the arm angle (-1)."""
 
@@ -209,7 +208,7 @@ class ChainSolver(ABC):
         return ()
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SphericalWristSolver(ChainSolver):
     """Axes 2 and 3 parallel, and a spherical wrist."""
 
@@ -276,7 +275,7 @@ class SphericalWristSolver(ChainSolver):
         return _names_by_side(self.links, self.constants.wrist_in_tool, x)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ParallelAxes(ChainSolver):
     """Axes 2, 3 and 4 parallel, 5 and 6 meet."""
 
@@ -356,7 +355,7 @@ BranchSolver = SphericalWristSolver | ParallelAxes
 """Classes whose eight branches are known where no joint is free and no two meet, without a second look."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class EliminationSolver(ChainSolver):
     """Any six joints of which at most two slide."""
 
@@ -381,7 +380,7 @@ class EliminationSolver(ChainSolver):
         return found.q, found.certainty
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ArmAngle(ChainSolver):
     """Seven joints with a spherical shoulder and wrist; self-motions are collected over the arm angle."""
 
@@ -435,7 +434,7 @@ class ArmAngle(ChainSolver):
         return tuple(SLOT_NAMES[first + 4 * (s // 2 % 2) + 2 * (s // 4) + s % 2] for s in range(8))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class GantrySolver(ChainSolver):
     """Six joints, three of them prismatic."""
 
@@ -473,7 +472,7 @@ class GantrySolver(ChainSolver):
         return "wrist_plus", "wrist_minus"
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ScaraSolver(ChainSolver):
     """Four joints of one direction, one of them prismatic."""
 
@@ -512,7 +511,7 @@ class ScaraSolver(ChainSolver):
         return "elbow_plus", "elbow_minus"
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PaddedChain(ChainSolver):
     """Fewer than six joints, solved with joints that the chain lacks at these places (from 0, rising)."""
 
@@ -542,11 +541,9 @@ class PaddedChain(ChainSolver):
             x[np.abs(wrap_to_pi(x[:, :, list(self.lacking)])).max(axis=2) > LEFT_OVER] = np.nan
         x = np.delete(x, self.lacking, axis=2)
         for first in range(x.shape[1]):  # rows that differ in the joints that are not there
-            same = np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
-            x[:, first + 1 :][same] = np.nan
-            meet = (
-                np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
-            )
+            away = np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0)
+            x[:, first + 1 :][away < 1e-9] = np.nan
+            meet = (away >= 1e-9) & (away < DOUBLE_ROOT)
             certainty = np.where(meet.any(axis=1), CONTINUUM, certainty)
         return x, certainty
 
@@ -568,7 +565,7 @@ class PaddedChain(ChainSolver):
         return self.rest.names(full)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class LinkedRows(ChainSolver):
     """A chain whose rows a linkage moves together (a levelling one, say): those of its solutions that keep to it.
 

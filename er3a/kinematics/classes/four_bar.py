@@ -7,10 +7,9 @@ and the ends of its ranges follow from the triangle's inequality.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import size_of
 from er3a.kinematics.classes.arm_angle import about_z
@@ -26,7 +25,7 @@ SAME_FAMILY = 1e-6  # rad, of joints 1 and 5
 FREE = 1e-9  # rad between axis 6 and the parallel axes within which joint 5's roots are one family
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class FourBar:
     """A continuum of solutions: axis 6 along the parallel axes, links 2, 3, 4 and the line to W turn as a four-bar.
 

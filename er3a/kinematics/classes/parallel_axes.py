@@ -20,12 +20,12 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.vectors import TURN, Vector, dot
+from er3a.by_value import by_identity
+from er3a.geometry.vectors import TURN, Rows, Vector, add, dot, subtract, turned_by
 from er3a.kinematics.block_inverse import (
     MARK,
     PAIR_ROWS,
@@ -39,7 +39,6 @@ from er3a.kinematics.block_inverse import (
 )
 from er3a.kinematics.chain import axes_of, meeting_point, poses_of, rows_at, size_of
 from er3a.kinematics.classes.arm_angle import (
-    Rows,
     SphericalConstants,
     spherical_constants,
     spherical_triangles,
@@ -90,7 +89,7 @@ class ParallelConstants(NamedTuple):
     near_m: float
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ThreeParallel:
     """The solver of one arm: its links (7, 4, 4) and constants."""
 
@@ -234,16 +233,10 @@ def parallel_rows(arm: ThreeParallel, T: Reals, slack: float = 0.0) -> tuple[Rea
 @inner_kernel
 def _into_frame(k: ParallelConstants, pose: Reals) -> None:
     """W, axis 6 and the vector across it in the arm's frame."""
-    (ox, oy, oz), (a, b, c), (d, e, f), (g, h, w) = k.place, k.wrist_in_tool, k.axis_6_in_tool, k.beside_6_in_tool
     for i in range(BLOCK):
-        t00, t01, t02, t03, t10, t11, t12, t13, t20, t21, t22, t23 = rows_at(pose, BLOCK, i)
-        p = (
-            t00 * a + t01 * b + t02 * c + t03 - ox,
-            t10 * a + t11 * b + t12 * c + t13 - oy,
-            t20 * a + t21 * b + t22 * c + t23 - oz,
-        )
-        z = t00 * d + t01 * e + t02 * f, t10 * d + t11 * e + t12 * f, t20 * d + t21 * e + t22 * f
-        x = t00 * g + t01 * h + t02 * w, t10 * g + t11 * h + t12 * w, t20 * g + t21 * h + t22 * w
+        rows, position = rows_at(pose, BLOCK, i)
+        p = subtract(add(turned_by(rows, k.wrist_in_tool), position), k.place)
+        z, x = turned_by(rows, k.axis_6_in_tool), turned_by(rows, k.beside_6_in_tool)
         for row in range(3):
             pose[(_W + row) * BLOCK + i] = dot(k.turn[row], p)
             pose[(_Z6 + row) * BLOCK + i] = dot(k.turn[row], z)

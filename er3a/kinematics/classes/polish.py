@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.kinematics.chain import multiply_rigid, post_rotate_z
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
 from er3a.numerics.jit import inner_kernel
 
 SOLVES = 1e-12  # residual, rad and parts of the chain's size
@@ -212,7 +212,7 @@ def _step(J: Reals, columns: Integers, dq: Reals) -> None:
 
 
 @inner_kernel
-def newton(  # noqa: C901
+def newton(
     links: Reals, sliding: Flags, T: Reals, q: Reals, most: int, w: Reals, J: Reals, dq: Reals, columns: Integers
 ) -> tuple[float, float]:
     """Move joint values to a root by Newton's steps, without steps that the pose does not determine. Kernel.
@@ -235,13 +235,11 @@ def newton(  # noqa: C901
     for _ in range(most):
         error = residual_and_jacobian(links, sliding, T, q, w, J)
         if error >= smallest and smallest < 1e-8:  # rounding is reached
-            for k in range(6):
-                q[k] = best[k]
+            copy_values(best, q)
             return smallest, pivot
         if error < smallest:
             smallest = error
-            for k in range(6):
-                best[k] = q[k]
+            copy_values(q, best)
         if error < 2e-16:
             return error, pivot
         pivot = pivoted(J, columns)
@@ -258,8 +256,7 @@ def newton(  # noqa: C901
             return size * size + 2e-16, pivot
     error = residual_and_jacobian(links, sliding, T, q, w, J)
     if error > smallest:
-        for k in range(6):
-            q[k] = best[k]
+        copy_values(best, q)
         return smallest, pivot
     return error, pivot
 

@@ -12,10 +12,9 @@ they shift against each other with the tool at rest: a position within reach the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import frame_along
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import axes_of, poses_of
@@ -28,7 +27,7 @@ PARALLEL = 1e-9  # rad
 MIN_LINK_M = 1e-9  # a shorter link makes two axes one
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Scara:
     """Plane coordinates are along the rows of ``frame`` (3, 3), the last one the common direction, at the first axis.
 
@@ -123,7 +122,7 @@ FLAT = 1e-8  # smallest singular value of sliding directions, in parts of the la
 REACHED = 1e-9  # m, by which slides that don't span space may miss a position
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Gantry:
     """The solver of one arm; ``frame`` and ``behind`` (3, 3) are those of :func:`spherical_constants`."""
 

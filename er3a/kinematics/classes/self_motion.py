@@ -13,10 +13,9 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.classes.polish import error_and_columns, largest_of
 from er3a.numerics.arrays import Flags, Reals
@@ -408,7 +407,7 @@ def roots_from_starts(posed: Posed, starts: Reals, out: Reals) -> int:
     return count
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class TracedCurve:
     """A traced curve of self-motion.
 
@@ -424,7 +423,7 @@ class TracedCurve:
     dimension: int
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PoseChain:
     """A chain with a pose and a task, scaled to the chain's size, whose curves are traced."""
 

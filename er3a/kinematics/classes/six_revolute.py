@@ -13,13 +13,12 @@ doubt is also solved at neighbouring poses, whose solutions are followed back.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
-import scipy
 
-from er3a.geometry.transforms import inverted
+from er3a.by_value import by_identity
+from er3a.geometry.transforms import exp_rotation, inverted
 from er3a.kinematics.chain import invert_rigid, multiply_rigid, poses_of, size_of
 from er3a.kinematics.classes.hidden_joint import Reading, equations_of_pose, readings_of, sampled_determinant
 from er3a.kinematics.classes.loop_rows import LoopMemory, hidden_angles, new_memory, pairs_at, remaining_joints
@@ -63,7 +62,7 @@ class PreparedArm(Protocol):
 _Arm = TypeVar("_Arm", bound=PreparedArm)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SixRevolute:
     """What the solver keeps of a chain: links in units of its size, and readings of its loop, best first; whether the
     first is clear at all poses that were tried."""
@@ -75,7 +74,7 @@ class SixRevolute:
     clear: bool
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class RowsFound:
     """Solutions of a batch of poses.
 
@@ -215,7 +214,7 @@ def _beside(certainty: Integers, T: Reals, count: Integers) -> Iterator[tuple[In
             return
         offset = random.normal(size=6) * ASIDE[k % len(ASIDE)]
         beside = np.eye(4)
-        beside[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(offset[:3]).as_matrix()
+        beside[:3, :3] = exp_rotation(offset[:3])
         beside[:3, 3] = offset[3:]
         before = count[in_doubt]
         yield in_doubt, T[in_doubt] @ beside

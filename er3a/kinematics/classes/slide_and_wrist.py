@@ -16,17 +16,17 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import frame_along, inverted
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import axes_of, meeting_point, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import SphericalConstants, spherical_constants
 from er3a.kinematics.classes.scara import wrist_angles
 from er3a.kinematics.classes.six_revolute import CERTAIN, SLOTS, UNCERTAIN, RowsFound, in_order
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Reals, zeros_of
 
 MEETS = 1e-9  # of the size, by which axes miss the wrist centre; sine between neighbouring axes of the wrist
 PARALLEL = 1e-11  # of the lines' coefficients, by which they are parallel for all d
@@ -41,7 +41,7 @@ WRIST = 1e-9  # squared half tilt of the wrist, about
 POSE = 1e-10  # what rows may miss a pose by
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SlideAndWrist:
     """The solver of one arm, lengths in units of its size.
 
@@ -244,10 +244,7 @@ def _slides(lines: Reals, n: Reals) -> tuple[Reals, Flags]:
         degree[np.abs(polynomial[:, k]) > PARALLEL * size] = k
     for own in np.unique(degree[degree > 0]).tolist():
         at = degree == own
-        companion = np.zeros((int(at.sum()), own, own))
-        companion[:, np.arange(1, own), np.arange(own - 1)] = 1.0
-        companion[:, :, -1] = -polynomial[at, :own] / polynomial[at, own, None]
-        roots = np.linalg.eigvals(companion)
+        roots = zeros_of(polynomial[at, : own + 1])
         d[at, :own] = np.where(np.abs(roots.imag) < NEARLY_REAL * (1 + np.abs(roots)), roots.real, np.nan)
     return d, size < PARALLEL
 

@@ -18,13 +18,13 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.geometry.transforms import inverted
-from er3a.kinematics.chain import poses_of, size_of
+from er3a.kinematics.chain import invert_rigid, poses_of, size_of
 from er3a.kinematics.classes.hidden_joint import HARMONICS, SAMPLE_ANGLES, SAMPLES
 from er3a.kinematics.classes.loop_rows import LoopMemory
 from er3a.kinematics.classes.polish import SOLVES
@@ -37,7 +37,7 @@ from er3a.kinematics.classes.six_revolute import (
     add_root,
     all_rows,
 )
-from er3a.numerics.arrays import Complexes, Flags, Integers, Reals
+from er3a.numerics.arrays import Complexes, Flags, Integers, Reals, zeros_of
 from er3a.numerics.jit import inner_kernel, kernel
 
 TRIALS = 24  # random poses on which readings are compared
@@ -70,7 +70,7 @@ class SlideReading(NamedTuple):
     usual: float
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class TwoSlides:
     """What the solver keeps of a chain: links in units of its size, and readings of its loop, best first."""
 
@@ -209,10 +209,7 @@ def _zeros(terms: Reals, degree: int) -> Reals:
     for own in np.unique(size[size > 0]).tolist():
         at = size == own
         a = ascending[at, degree - own : degree + own + 1]
-        companion = np.zeros((len(a), 2 * own, 2 * own), dtype=complex)
-        companion[:, np.arange(1, 2 * own), np.arange(2 * own - 1)] = 1.0
-        companion[:, :, -1] = -a[:, :-1] / a[:, -1:]
-        z = np.linalg.eigvals(companion)
+        z = zeros_of(a)
         out[at, : 2 * own, 0], out[at, : 2 * own, 1] = np.angle(z), np.log(np.maximum(np.abs(z), 1e-300))
     return out
 
@@ -226,15 +223,7 @@ def _loop_of(reading: SlideReading, pose_link: Reals, links: Reals, A: Reals) ->
     if reading.sense > 0.0:
         K[:, :] = pose_link
     else:
-        for i in range(3):
-            for j in range(3):
-                K[i, j] = pose_link[j, i]
-        for i in range(3):
-            K[i, 3] = -(
-                pose_link[0, i] * pose_link[0, 3]
-                + pose_link[1, i] * pose_link[1, 3]
-                + pose_link[2, i] * pose_link[2, 3]
-            )
+        invert_rigid(pose_link, K)
     at = -1
     for i in range(6):
         if not reading.slides[i]:
@@ -355,7 +344,7 @@ def _rows(
     for i in range(numbers.shape[0]):
         n = numbers[i]
         _loop_of(reading, loops[n], links, A)
-        reach = max(1.0, max(abs(poses[n, 0, 3]), max(abs(poses[n, 1, 3]), abs(poses[n, 2, 3]))))
+        reach = max(1.0, abs(poses[n, 0, 3]), abs(poses[n, 1, 3]), abs(poses[n, 2, 3]))
         verdict, expected, before = CERTAIN, 0, count[n]
         for z in range(zeros.shape[1]):
             # Zeros off the unit circle are complex angles; those near to it may be real ones that rounding has moved.

@@ -6,12 +6,12 @@ The article's own inputs are constants here, with the section that they come fro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.comparison.compare import compare
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, frames
@@ -32,7 +32,7 @@ STATEMENTS = "er3a_c60_article"  # the reference set with the article's sentence
 MOVE, LINE = "article_joint", "article_line"  # paths of the study
 
 
-@dataclass(frozen=True)
+@frozen
 class TableNumbers:
     """What one table comes to.
 
@@ -68,7 +68,7 @@ class TableNumbers:
     line_speed_deg_s: float | None
 
 
-@dataclass(frozen=True)
+@frozen
 class ArticleNumbers:
     """All that the page shows: three tables, and what concerns the printed one alone (mm, deg, deg/s, ratios)."""
 

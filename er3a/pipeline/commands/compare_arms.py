@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from er3a.by_value import frozen
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM, Tolerances
 from er3a.errors import DoubtfulUnit, Er3aError
 from er3a.finding import plain
 from er3a.pipeline.commands.dh_options import Angles, Conventions, Lengths
 from er3a.pipeline.commands.options import (
-    ROBOT_FILES,
     AsJson,
     Base,
     Columns,
@@ -46,7 +46,7 @@ OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbe
 _ARM = "a D-H table in any form (- is standard input), a robot's name or file, a URDF or xacro"
 
 
-@dataclass(frozen=True)
+@frozen
 class CompareRequest:
     """What a call of ``er3a compare`` asks for: how files are read, tolerances (mm, deg), and what is written."""
 
@@ -64,7 +64,7 @@ class CompareRequest:
         return Tolerances(self.tolerance_mm / 1000, math.radians(self.tolerance_deg))
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@app.command()
 def compare(
     a: Annotated[str, typer.Argument(metavar="A", help=f"the arm to test: {_ARM}")],
     others: Annotated[

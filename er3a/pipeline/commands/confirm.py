@@ -12,7 +12,7 @@ import typer
 
 from er3a.errors import Er3aError, InputError
 from er3a.files.kept_files import names, write_text
-from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Base, Tip, app, print_json, print_note
+from er3a.pipeline.commands.options import AsJson, Base, Tip, app, print_json, print_note
 
 if TYPE_CHECKING:
     from er3a.confirmation.confirm import Confirmation
@@ -29,7 +29,7 @@ class Expected(StrEnum):
     small = "small"
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@app.command()
 def confirm(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file, a D-H table or a URDF")],
     poses: Annotated[

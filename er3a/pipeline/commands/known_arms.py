@@ -11,7 +11,7 @@ from er3a.errors import Er3aError
 from er3a.pipeline.commands import options
 
 
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
+@options.app.command()
 def arms(
     word: Annotated[str, typer.Argument(help="a part of a name, maker or model (default: all)")] = "",
     *,

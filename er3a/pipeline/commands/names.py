@@ -12,13 +12,10 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-FIRST = "Studies"
 ROBOT_FILES = "Robot files"
-PROGRAMS = "Robot programs"
-JOBS = "Single jobs, called by the workflow"
 
 _GROUPS = {
-    ("studies", FIRST): {
+    ("studies", "Studies"): {
         "new": "Write a study for an arm: robot file, scene, targets and paths that the arm can do, README.",
         "check": "Check input files: print the kind of each file, or its error; of a URDF also the "
         "rules that it breaks.",
@@ -51,11 +48,11 @@ _GROUPS = {
     ("single_jobs", ROBOT_FILES): {
         "teach": "Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.",
     },
-    ("programs", PROGRAMS): {
+    ("programs", "Robot programs"): {
         "check-program": "Check each motion of robot programs. Findings are lines: file:line: level: message \\[code].",
         "program": "Write robot programs from paths.",
     },
-    ("single_jobs", JOBS): {
+    ("single_jobs", "Single jobs, called by the workflow"): {
         "compute": "Compute a stage: tables and summary.json.",
         "views": "Write a robot's recordings (always in English), a picture of each, and pages from results.",
         "index": "Write the index.",
@@ -72,10 +69,10 @@ class CommandsByName(TyperGroup):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        shown = {
-            name: TyperCommand(name, help=line, rich_help_panel=panel) for name, (_, panel, line) in COMMANDS.items()
-        }
+        shown = {name: TyperCommand(name, help=line) for name, (*_, line) in COMMANDS.items()}
         self.commands = {**shown, **self.commands}
+        for name, (_, panel, _) in COMMANDS.items():
+            vars(self.commands[name]).update(rich_help_panel=panel)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first word names, its module imported now.

@@ -14,10 +14,10 @@ import typer
 
 from er3a.errors import Er3aError, InputWarning
 from er3a.files.kept_files import own_or_shipped
-from er3a.pipeline.commands.names import FIRST, JOBS, PROGRAMS, ROBOT_FILES, app
+from er3a.pipeline.commands.names import app
 from er3a.version import __version__
 
-__all__ = ["FIRST", "JOBS", "PROGRAMS", "ROBOT_FILES", "app"]
+__all__ = ["app"]
 
 DEFAULT_STUDY = Path("config/config.yaml")
 DEFAULT_RESULTS = Path("results")

@@ -14,7 +14,7 @@ import typer
 from er3a.errors import Er3aError
 from er3a.finding import is_one
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, given_files, print_json, print_note
+from er3a.pipeline.commands.options import AsJson, FailOn, app, given_files, print_json, print_note
 from er3a.programs.program_names import LanguageName
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -55,7 +55,7 @@ Seconds = Annotated[
 ]
 
 
-@app.command(rich_help_panel=PROGRAMS)
+@app.command()
 def check_program(
     files: ProgramFiles,
     *,
@@ -143,7 +143,7 @@ def _assumed(given: list[str]) -> tuple[tuple[str, ...], dict[str, bool | float]
 
 
 program_app = typer.Typer(help="Write robot programs from paths.", no_args_is_help=True)
-app.add_typer(program_app, name="program", rich_help_panel=PROGRAMS)
+app.add_typer(program_app, name="program")
 
 
 @program_app.command()

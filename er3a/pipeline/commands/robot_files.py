@@ -34,7 +34,7 @@ class FixedPlacement(StrEnum):
     RATIOS = "ratios"
 
 
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
+@options.app.command()
 def import_urdf(
     file: Annotated[Path, typer.Argument(help="a URDF or xacro of a serial arm")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
@@ -64,7 +64,7 @@ def import_urdf(
     print(f"{output}: written; differs from the URDF by at most {imported.misfit_m * 1000:.2g} mm on random poses")
 
 
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
+@options.app.command()
 def export_urdf(
     robot: options.AnyRobot,
     output: Annotated[Path, typer.Option(help="the URDF to write")],
@@ -93,7 +93,7 @@ def export_urdf(
         print(f"{file}: written")
 
 
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
+@options.app.command()
 def import_calibration(
     file: Annotated[
         Path, typer.Argument(help="calibration.conf of a Universal Robots arm, or the YAML of extract_calibration")
@@ -176,7 +176,7 @@ def _write_calibrated(corrected: Robot, record: dict[str, object], output: Path)
     return model
 
 
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
+@options.app.command()
 def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
     measurements: Annotated[Path, typer.Argument(help="a CSV of measured positions")],
@@ -249,7 +249,7 @@ def calibrate(
         raise typer.Exit(1)
 
 
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
+@options.app.command()
 def predict(
     model: Annotated[Path, typer.Argument(help="NAME_model.json, which er3a calibrate --output NAME.yaml writes")],
     joints: Annotated[Path, typer.Argument(help="a CSV with the columns q1_deg ... (q3_mm of a joint that slides)")],
@@ -274,7 +274,7 @@ def predict(
         print(",".join(f"{number:.6f}" for number in numbers))
 
 
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
+@options.app.command()
 def hand_eye(
     file: Annotated[
         Path, typer.Argument(callback=options.given_files, help="a calibration set (YAML, kind: hand_eye)")

@@ -30,7 +30,7 @@ StageNames = Annotated[
 ]
 
 
-@options.app.command(rich_help_panel=options.JOBS)
+@options.app.command()
 def compute(
     stage: StageNames,
     robot: options.RobotName,
@@ -57,7 +57,7 @@ def compute(
             print(f"{options.DEFAULT_REPORTS / robot / show}.html can be read while the rest is computed", flush=True)
 
 
-@options.app.command(rich_help_panel=options.JOBS)
+@options.app.command()
 def views(
     robot: options.RobotName,
     pages: Annotated[
@@ -101,7 +101,7 @@ def _write_teach_page(study: Study, robot: str, results: Path, reports: Path) ->
     write_checksum(page)
 
 
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
+@options.app.command()
 def teach(
     robot: Annotated[
         str, typer.Argument(metavar="ROBOT", help="a robot of the study, or a robot file, D-H table or URDF")
@@ -160,7 +160,7 @@ def _teach_file(source: str, page: Path, given: dict[str, Any]) -> None:
     print(f"{page}: written")
 
 
-@options.app.command(rich_help_panel=options.JOBS)
+@options.app.command()
 def index(
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
@@ -178,7 +178,7 @@ def index(
         write_checksum(reports / page)
 
 
-@options.app.command(rich_help_panel=options.JOBS)
+@options.app.command()
 def article(
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,

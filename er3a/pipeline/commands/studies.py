@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from er3a.pipeline.verdicts import StageVerdict
 
 
-@options.app.command(rich_help_panel=options.FIRST)
+@options.app.command()
 def new(
     folder: Annotated[Path, typer.Argument(help="folder to write the study into; existing files are kept")],
     *,
@@ -69,7 +69,7 @@ def new(
 WHAT_IT_DOES = "what it does, for which see er3a check-program"
 
 
-@options.app.command(rich_help_panel=options.FIRST)
+@options.app.command()
 def check(
     files: Annotated[
         list[Path] | None,
@@ -127,7 +127,7 @@ def check(
         raise typer.Exit(worst)
 
 
-@options.app.command(rich_help_panel=options.FIRST, context_settings={"ignore_unknown_options": True})
+@options.app.command(context_settings={"ignore_unknown_options": True})
 def run(
     words: Annotated[
         list[str] | None,
@@ -153,7 +153,7 @@ def run(
             _end_with_findings([each for each in old if each.robot in (robots or [each.robot])], options.FailOn.fail)
 
 
-@options.app.command(rich_help_panel=options.FIRST)
+@options.app.command()
 def verdicts(
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
@@ -198,7 +198,7 @@ def _end_with_findings(found: Sequence[StageVerdict], level: options.FailOn) -> 
         raise typer.Exit(1)
 
 
-@options.app.command(rich_help_panel=options.FIRST)
+@options.app.command()
 def view(
     robot: options.SomeRobot = None,
     reports: options.Reports = options.DEFAULT_REPORTS,

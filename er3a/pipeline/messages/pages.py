@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from er3a.by_value import frozen
 from er3a.pipeline.language import terms, tr, words
 from er3a.pipeline.messages.say import word
 
@@ -84,7 +84,7 @@ GLOSSARY = terms(
 )
 
 
-@dataclass(frozen=True)
+@frozen
 class Caveat:
     """What to know first, and what validation found that it comes from."""
 

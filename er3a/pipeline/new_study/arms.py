@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from er3a.by_value import by_identity
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError, InputError
 from er3a.files.reference_sets import reference_folder
@@ -22,7 +23,7 @@ NO_SHAPES = "it gives no collision shapes; capsules are guessed from the table's
 SCHEMA_LINE = "# yaml-language-server: $schema=../../config/robot.schema.json\n"
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Arm:
     """An arm, and what its file in the study says.
 

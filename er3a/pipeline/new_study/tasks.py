@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import chain, combinations, islice, product
 from typing import Any
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
@@ -59,7 +59,7 @@ DURATIONS_S = (3.0, 6.0, 12.0)
 PATH_SAMPLES = 50
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SampledReach:
     """Of the tool point over random joint values.
 
@@ -136,7 +136,7 @@ def _scene(title: str, height_mm: float) -> dict[str, Any]:
     return {"kind": "scene", "title": title, "planes": [plane]}
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Spot:
     """A pose that the arm reaches, and the solution (n,) in rad or m that is best there.
 

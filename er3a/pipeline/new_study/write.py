@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import jinja2
 
+from er3a.by_value import by_identity
 from er3a.errors import Er3aError
 from er3a.files.kept_files import ROOT, write_atomically, write_text
 from er3a.files.reference_sets import FORMATS
@@ -30,7 +30,7 @@ SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class FoundTasks:
     """Scene, targets and paths of a study.
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import PairState, base_contacts
@@ -23,7 +23,7 @@ from er3a.pipeline.scope import Check, Coverage, Open
 from er3a.robots.robot import Robot
 
 
-@dataclass(frozen=True)
+@frozen
 class Covered:
     """What a check for collisions sees.
 

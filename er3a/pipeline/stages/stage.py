@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from er3a.by_value import frozen
 from er3a.files.yaml_file import StrictModel
 from er3a.finding import Finding
 from er3a.numerics.jit import kernels_folder
@@ -17,7 +17,7 @@ StudyFiles = Any
 """What a stage asks of a study to name its inputs: ``er3a.pipeline.study.StudyBase``, which imports the stages."""
 
 
-@dataclass(frozen=True)
+@frozen
 class Stage:
     """An entry of the registry.
 

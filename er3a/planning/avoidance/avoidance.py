@@ -5,11 +5,11 @@ motion, or the reason why it is not possible or not usable.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.finding import Finding
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Flags, Reals, runs
@@ -22,7 +22,7 @@ AT_REST = 1e-6  # rad
 POINTS = 501  # grid points of a stretch that its timing passes through at most
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Avoidance:
     """A strategy, carried out.
 
@@ -37,7 +37,7 @@ class Avoidance:
     crosses_by_joints: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SingularSegment:
     """A path that comes nearer to a singular set than ``near``, or leaves the arm's reach.
 

@@ -11,13 +11,14 @@ gives the direction of the bend; its size is found on the bent path itself.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 from typing import Any, Literal, Protocol, cast
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.errors import PoseError
 from er3a.finding import Finding, fact, turned_or_moved
 from er3a.geometry.transforms import frame_along, moved
@@ -47,7 +48,7 @@ SAME_TIME = 0.01  # s
 SPARE = 1.0005  # keep this much more than the distance
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Bend:
     """A smooth bulge of a path: rises from ``start`` to its full size at ``top``, and falls to nothing at ``end``.
 
@@ -85,7 +86,7 @@ class Bend:
         return np.where(progress < self.top, quintic(rise, 1.0, zero, one)[0], quintic(fall, 1.0, zero, one)[0])
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class BentPath:
     """A path of the tool with bends, on the path's own time law."""
 
@@ -124,11 +125,7 @@ class BentPath:
         progress = np.asarray(progress, float)
         T = self.path.poses(progress)
         for bend in self.bends:
-            size = bend.size(progress)[..., None]
-            T[..., :3, 3] += size * bend.shift
-            if bend.tilt.any():
-                turns = scipy.spatial.transform.Rotation.from_rotvec((size * bend.tilt).reshape(-1, 3)).as_matrix()
-                T[..., :3, :3] = turns.reshape(*progress.shape, 3, 3) @ T[..., :3, :3]
+            T = moved(T, bend.size(progress)[..., None] * np.append(bend.shift, bend.tilt))
         return T
 
 
@@ -525,7 +522,7 @@ ON_PATH = 1e-6, np.radians(1e-4)
 OVER = 1e-6  # relative, by which rounding may exceed a limit
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class StrategyCost:
     """A strategy's motion, and what it costs.
 
@@ -547,7 +544,7 @@ class StrategyCost:
     keeps_clear: bool
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class StrategyResult:
     """What came of a strategy.
 

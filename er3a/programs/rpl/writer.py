@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 import zlib
 from bisect import bisect_right
-from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.numerics.arrays import Reals
 from er3a.planning.sequences import Arc
 from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone, numbers_of
@@ -30,7 +30,7 @@ MIN_CHORD_ZONE, MAX_CHORD_ZONE = 0.001, 0.2  # m, of the zones between the chord
 USUAL_JOINT, USUAL_LINE = "v50perc", "v100"
 
 
-@dataclass(frozen=True)
+@frozen
 class RplItem:
     """A statement, for text and XML alike.
 

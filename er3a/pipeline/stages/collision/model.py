@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
+from er3a.by_value import frozen
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -14,7 +14,7 @@ from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 
 
-@dataclass(frozen=True)
+@frozen
 class FreeShare:
     """A share of random joint vectors, with its 95 % interval (Wilson)."""
 
@@ -22,7 +22,7 @@ class FreeShare:
     interval: tuple[float, float]
 
 
-@dataclass(frozen=True)
+@frozen
 class PlacesSummary:
     """Cells of space that the tool point was brought to, of edge ``cell_m``; volumes are those of whole cells."""
 
@@ -34,7 +34,7 @@ class PlacesSummary:
     lost_m3: float
 
 
-@dataclass(frozen=True)
+@frozen
 class Mounting:
     """A solid that the base overlaps, which is taken as what it is mounted on; ``inside``: its middle is in it."""
 
@@ -43,7 +43,7 @@ class Mounting:
     inside: bool
 
 
-@dataclass(frozen=True)
+@frozen
 class Closest:
     """Where a target's chosen solution or a path comes nearest to anything; points on the two bodies, in mm."""
 

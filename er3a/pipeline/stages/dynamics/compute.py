@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.collision.shapes import shapes_assumed
 from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
@@ -197,7 +197,7 @@ def _no_limits(paths: list[model.PathLoad], holding: tuple[model.HoldingTorque, 
     )
 
 
-@dataclass(frozen=True)
+@frozen
 class LoadedArm:
     """An arm with its loads.
 
@@ -246,7 +246,7 @@ class LoadedArm:
         return margins.torque_tolerance(self.model, q, qd, qdd, self.links_grade, self.load_grade)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PathTorques:
     """A path with its torques.
 

@@ -7,9 +7,9 @@ Torques are those that the drives give, in the manufacturer's signs: N m for rev
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal, get_args
 
+from er3a.by_value import frozen
 from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
@@ -29,7 +29,7 @@ Quantity = Literal["peak", "rms", "holding"] | WristQuantity
 LoadPart = Literal["tool", "carried", "load_centre", "load_inertia", "load_guess"]
 
 
-@dataclass(frozen=True)
+@frozen
 class Use:
     """What is asked for against what is allowed, in one unit.
 
@@ -65,7 +65,7 @@ mass, which count as massless, the ``doubts`` on masses besides, and the ``grade
 document or scale gives them, else None."""
 
 
-@dataclass(frozen=True)
+@frozen
 class LinkEntry:
     """The mass of a link as it was used; centre in the frame that moves with the link's joint. None: unknown."""
 
@@ -75,7 +75,7 @@ class LinkEntry:
     estimated: bool
 
 
-@dataclass(frozen=True)
+@frozen
 class TolerancesUsed:
     """By how much masses and centres are taken to be off; ``assumed`` by the grade where the file says nothing."""
 
@@ -85,7 +85,7 @@ class TolerancesUsed:
     assumed: bool
 
 
-@dataclass(frozen=True)
+@frozen
 class MassesUsed:
     """Links, and what hangs on the flange (None: nothing); ``density_kg_m3`` of guessed ones."""
 
@@ -100,7 +100,7 @@ class MassesUsed:
     tolerances: TolerancesUsed
 
 
-@dataclass(frozen=True)
+@frozen
 class HoldingTorque:
     """The maximum torque found that a joint holds at rest within the limits, and the pose where it does."""
 
@@ -144,7 +144,7 @@ def hardest_held(holding: tuple[HoldingTorque, ...]) -> HoldingTorque:
     return max(holding, key=lambda held: (held.unit == TORQUE and abs(held.torque) > NOTHING_HELD, abs(held.torque)))
 
 
-@dataclass(frozen=True)
+@frozen
 class JointLoad:
     """What a path asks of a drive.
 
@@ -173,7 +173,7 @@ class JointLoad:
     recovered_j: float
 
 
-@dataclass(frozen=True)
+@frozen
 class BindingLimit:
     """The largest value under the limits, and what binds; None where nothing does.
 
@@ -186,7 +186,7 @@ class BindingLimit:
     t_s: float | None
 
 
-@dataclass(frozen=True)
+@frozen
 class WristMoment:
     """The largest moment that the load makes about a wrist axis along a path, with accelerations and what the
     surroundings do to the tool; ``tolerance``: by which it may be above that at any time."""
@@ -197,7 +197,7 @@ class WristMoment:
     t_s: float
 
 
-@dataclass(frozen=True)
+@frozen
 class PathLoad:
     """A path's loads.
 
@@ -226,7 +226,7 @@ class PathLoad:
         return max(self.joints, key=lambda load: (load.unit == TORQUE, load.peak))
 
 
-@dataclass(frozen=True)
+@frozen
 class MotorNeed:
     """What each drive must give over all paths that may be run, and at rest in the worst pose.
 

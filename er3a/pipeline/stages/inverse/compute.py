@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-import scipy
 
+from er3a.by_value import by_identity
 from er3a.collision.along import bodies_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
 from er3a.finding import Amount, Finding, fact, is_one
-from er3a.geometry.transforms import rpy_of
+from er3a.geometry.transforms import quaternion_of, rpy_of
 from er3a.kinematics.by_class import arm_solver, misses
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.closed_form import ORIENTATION
@@ -49,7 +49,7 @@ from er3a.selection.select import refusals
 LITTLE_MARGIN_DEG = 2.0  # mm of a prismatic joint; as much as grasps and boxes are asked for by default
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SolvedTarget:
     """What the summary holds of a target, one row for each of its solutions, and what they were made from."""
 
@@ -96,15 +96,12 @@ def solve_target(
             usable = _usable(robot, scene, clearance)
             near = stated(model.NeighbourPoses, neighbours(robot, target.T, usable))
             advice = (*advice, *_what_would_help(near, clearance))
-    quaternion = scipy.spatial.transform.Rotation.from_matrix(target.T[:3, :3]).as_quat(
-        canonical=True, scalar_first=True
-    )
     result = stated(
         model.TargetResult,
         target,
         xyz=target.T[:3, 3],
         rpy=rpy_of(target.T),
-        quaternion_wxyz=quaternion,
+        quaternion_wxyz=quaternion_of(target.T),
         q_ref_deg=target.q_ref_deg,
         solutions=len(found),
         within_limits=len(within),

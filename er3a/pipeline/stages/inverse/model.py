@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.collision.pairs import Pair
 from er3a.finding import Finding
 from er3a.kinematics.solutions import Method, TargetOutcome, Unsolved
@@ -17,7 +17,7 @@ from er3a.selection.nearest import WhyFirst
 from er3a.selection.regular_first import SINGULAR_PARTS
 
 
-@dataclass(frozen=True)
+@frozen
 class NeighbourPoses:
     """Poses near a target without solution that have one; None where none was found (``kinematics.neighbours``)."""
 
@@ -28,7 +28,7 @@ class NeighbourPoses:
     shifted_to_mm: tuple[float, float, float] | None
 
 
-@dataclass(frozen=True)
+@frozen
 class TargetClearance:
     """How near a chosen solution comes to anything, negative by the depth of an overlap, and what comes so near."""
 
@@ -36,7 +36,7 @@ class TargetClearance:
     between: Pair
 
 
-@dataclass(frozen=True)
+@frozen
 class TargetResult:
     """One target.
 
@@ -71,7 +71,7 @@ class TargetResult:
     clearance: TargetClearance | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class RoundTrips:
     """Random joints to poses and back (``kinematics.round_trips.BatchRoundTrips``).
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
+from er3a.by_value import frozen
 from er3a.finding import Finding
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Results, Summary
@@ -19,7 +20,7 @@ from er3a.programs.program_names import LanguageName, ProgramOutcome
 NO_STEPS: Mapping[int, Any] = MappingProxyType({})
 
 
-@dataclass(frozen=True)
+@frozen
 class FindingAt:
     """A finding in the text of a program.
 
@@ -64,7 +65,7 @@ def _without_path(finding: Finding) -> Finding:
     return replace(finding, params={name: value for name, value in finding.params.items() if name != "place"})
 
 
-@dataclass(frozen=True)
+@frozen
 class ProgramSummary:
     """What is known of a program.
 

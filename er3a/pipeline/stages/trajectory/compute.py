@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.shapes import shapes_assumed
 from er3a.finding import Finding, fact
@@ -51,7 +52,7 @@ ROWS = 250  # of each motion in the table
 CLEARANCE_TIMES = 41
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Avoided:
     """What was tried on a path, and what to take.
 
@@ -67,7 +68,7 @@ class Avoided:
     clearance: model.Clearances
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class AvoidanceTask(MotionTask):
     """What all paths of a robot have in common.
 
@@ -108,7 +109,7 @@ class AvoidanceTask(MotionTask):
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
         chosen = best(free, meets, motion.built.duration)
-        tried = tuple(_tried(self.robot, result, *met.get(result.name, (None, None))) for result in results)
+        tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
         return Avoided(
             tried=tried,
             chosen=chosen.name if chosen else None,
@@ -206,7 +207,7 @@ class AvoidanceTask(MotionTask):
         return max(curve.of_joint(curve.velocity, j, sign).peak() for sign in (1.0, -1.0))[1]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _ToolPath:
     """The way of the tool on a move of the joints."""
 
@@ -266,17 +267,16 @@ def _quickest(segment: SingularSegment) -> Timed | None:
 
 
 def _tried(
-    robot: Robot,
     result: StrategyResult,
     meets: Finding | None,
     clearance: model.MinClearance | None,
 ) -> model.TriedStrategy:
     reasons = (*result.reasons, meets) if meets else result.reasons
-    motion = _motion(robot, result.cost, clearance) if result.cost else None
+    motion = _motion(result.cost, clearance) if result.cost else None
     return model.TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
 
 
-def _motion(robot: Robot, cost: StrategyCost, clearance: model.MinClearance | None) -> model.StrategyMotion:
+def _motion(cost: StrategyCost, clearance: model.MinClearance | None) -> model.StrategyMotion:
     return stated(
         model.StrategyMotion,
         cost,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity, frozen
 from er3a.collision.along import ClearanceAlong, Contact, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import label_of
@@ -32,7 +32,7 @@ SPEED_MARGIN = 0.9  # of a joint's speed limit; these four are chosen, no standa
 STOPS = 2.0  # times the time that the joints take to stop, left before the first fault
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Judgement:
     """A motion's faults and the verdict that they make.
 
@@ -202,7 +202,7 @@ def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair, along.measured)
 
 
-@dataclass(frozen=True)
+@frozen
 class SafeStop:
     """Up to where a motion keeps a margin.
 

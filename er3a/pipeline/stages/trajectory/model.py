@@ -5,9 +5,9 @@ Times count from a path's start, ways along the tool point's path. Angles are th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
+from er3a.by_value import frozen
 from er3a.collision.pairs import Pair
 from er3a.finding import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel
@@ -26,7 +26,7 @@ FASTEST: Literal["fastest"] = "fastest"
 """In the table of strategies: the path itself, as fast as the joints can."""
 
 
-@dataclass(frozen=True)
+@frozen
 class NearThresholds:
     """Distance from each singular set below which a pose counts as near-singular."""
 
@@ -35,7 +35,7 @@ class NearThresholds:
     shoulder_mm: float
 
 
-@dataclass(frozen=True)
+@frozen
 class LimitsUsed:
     """The joint limits that motions are judged by and timed with.
 
@@ -54,7 +54,7 @@ class LimitsUsed:
     jerk_deg_s3: tuple[float, ...] | None
 
 
-@dataclass(frozen=True)
+@frozen
 class HalfTurn:
     """A rotation by exactly 180 deg, and the axis in the base frame of the one of two ways that is taken."""
 
@@ -62,7 +62,7 @@ class HalfTurn:
     axis: tuple[float, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class Singularity:
     """A pass through a singular set (``crossing``), or by it at a distance.
 
@@ -82,7 +82,7 @@ class Singularity:
     smallest_singular_value: float | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Jump:
     """Where the branch in use ends, and the joint (from 1) that would have to move farthest to go on."""
 
@@ -91,7 +91,7 @@ class Jump:
     angle_deg: float
 
 
-@dataclass(frozen=True)
+@frozen
 class Stretch:
     """A stretch of a path, in time and along its way, on which something is wrong; and when it is worst, where that has
     a value."""
@@ -104,7 +104,7 @@ class Stretch:
     worst_s: float | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class MinClearance:
     """Where a path comes nearest to its surroundings or the arm to itself; negative by the depth of an overlap."""
 
@@ -114,7 +114,7 @@ class MinClearance:
     poses_measured: int
 
 
-@dataclass(frozen=True)
+@frozen
 class ClearUntil:
     """The last point of a path that collides, from whose start to there, and in a stop from there, it keeps a margin.
 
@@ -135,7 +135,7 @@ class ClearUntil:
     contact_mm: tuple[float, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class SoundEnd:
     """The last point at which a path may end: before anything is wrong, and with time to stop there.
 
@@ -152,7 +152,7 @@ class SoundEnd:
     stop_s: float | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class StrategyMotion:
     """A strategy's motion, against the path as programmed.
 
@@ -175,7 +175,7 @@ class StrategyMotion:
     clearance: MinClearance | None
 
 
-@dataclass(frozen=True)
+@frozen
 class TriedStrategy:
     """A strategy of singularity avoidance, tried on a path.
 
@@ -190,7 +190,7 @@ class TriedStrategy:
     motion: StrategyMotion | None
 
 
-@dataclass(frozen=True)
+@frozen
 class PathSummary:
     """What is known of a path.
 
@@ -285,7 +285,7 @@ class PathSummary:
         return next((tried for tried in self.avoidance if tried.name == self.strategy), None)
 
 
-@dataclass(frozen=True)
+@frozen
 class PathNotFollowed:
     """A path of the tool that could not be followed.
 

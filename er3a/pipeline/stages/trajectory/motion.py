@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.collision.along import RateBounds
 from er3a.collision.bodies import Bodies
 from er3a.collision.shapes import arm_shapes
@@ -43,7 +44,7 @@ from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PartOfProgram:
     """A stretch of a program (``file``) as an entry of a path file; ``rest``: lines that no stretch holds."""
 
@@ -74,7 +75,7 @@ class PartOfProgram:
 PlannedEntry = PathEntry | PartOfProgram
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class MotionTask(PlanningTask):
     """What motions of an arm are planned and judged by, for all stages and programs.
 
@@ -182,7 +183,7 @@ def misfits(robot: Robot, built: Built) -> tuple[str, ...]:
     return tuple(named)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Motion:
     """A path, ready to be checked.
 
@@ -440,7 +441,7 @@ def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:
     return joint_limits(robot, assumed_speeds(robot, settings), settings.acceleration_time_s, *given)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ListedMotion:
     """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
 

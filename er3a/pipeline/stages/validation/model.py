@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal, Self
 
+from er3a.by_value import frozen
 from er3a.diagnosis.diagnose import RankedHypothesis
 from er3a.files.robot_library import robot_of
 from er3a.finding import Finding, is_one
@@ -39,7 +39,7 @@ SelfChecked = Literal[
 Note = Finding | ClosedFormMissing
 
 
-@dataclass(frozen=True)
+@frozen
 class Judged:
     """What the model says (``measured``) against what it should; ``difference``: measured - expected.
 
@@ -71,7 +71,7 @@ class Judged:
         return abs(self.difference) / self.tolerance
 
 
-@dataclass(frozen=True)
+@frozen
 class Unjudged:
     """What could be checked, had the sources, or the robot's file, a value."""
 
@@ -93,7 +93,7 @@ class Unjudged:
 Check = Judged | Unjudged
 
 
-@dataclass(frozen=True)
+@frozen
 class Statement:
     """What one source says about a number that others contradict it about."""
 
@@ -106,7 +106,7 @@ class Statement:
     document: str = ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Conflict:
     """References of one set about one number that no model can meet all."""
 
@@ -120,7 +120,7 @@ class Conflict:
 Floats = tuple[float, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class CorrectedTable:
     """A Denavit-Hartenberg table without its most likely fault, in m and rad; ``base`` and ``flange`` (4, 4)."""
 
@@ -137,7 +137,7 @@ class CorrectedTable:
     flange: tuple[Floats, ...]
 
 
-@dataclass(frozen=True)
+@frozen
 class SetDiagnosis:
     """What a reference set says about which number of the table is wrong.
 
@@ -160,7 +160,7 @@ class SetDiagnosis:
     corrected: CorrectedTable | None
 
 
-@dataclass(frozen=True)
+@frozen
 class SetSummary:
     """What was found against one reference set.
 
@@ -192,7 +192,7 @@ class SetSummary:
         return self.counts.independent.failed + self.counts.consistency.failed
 
 
-@dataclass(frozen=True)
+@frozen
 class TableFacts:
     """The table's D-H convention, and why the arm has no closed-form inverse, if so."""
 
@@ -200,7 +200,7 @@ class TableFacts:
     no_closed_form: ClosedFormMissing | None
 
 
-@dataclass(frozen=True)
+@frozen
 class Margins:
     """How near to a singularity a pose is too near to judge its joints."""
 
@@ -209,7 +209,7 @@ class Margins:
     shoulder_mm: float
 
 
-@dataclass(frozen=True)
+@frozen
 class RoundTripErrors:
     """Worst errors of random poses taken back to joints, and the margins near to which joints are not judged.
 
@@ -230,7 +230,7 @@ class RoundTripErrors:
     margins: Margins
 
 
-@dataclass(frozen=True)
+@frozen
 class OtherTableFound:
     """Another table; see :class:`er3a.identifiability.entry_evidence.OtherTable`."""
 
@@ -238,7 +238,7 @@ class OtherTableFound:
     code: Literal["described", "allowed"]
 
 
-@dataclass(frozen=True)
+@frozen
 class TableEvidence:
     """What independent documents settle of the table, entry by entry (``er3a.identifiability``).
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
@@ -241,7 +242,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Cell:
     """An arm before the objects of a file, its camera calibrated.
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from er3a.by_value import frozen
 from er3a.collision.pairs import Pair
 from er3a.finding import Finding
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -16,7 +15,7 @@ Three = tuple[float, float, float]
 ROTATIONS = ("rx", "ry", "rz")
 
 
-@dataclass(frozen=True)
+@frozen
 class PoseEstimate:
     """A pose with half its 95 % intervals: of the position, and of small turns, by the axes of the parent frame."""
 
@@ -27,7 +26,7 @@ class PoseEstimate:
     half_width_deg: Three
 
 
-@dataclass(frozen=True)
+@frozen
 class TouchedPoint:
     """A point touched with the robot: its distance from where the camera puts it, and the half widths by axis."""
 
@@ -35,7 +34,7 @@ class TouchedPoint:
     half_width_mm: Three
 
 
-@dataclass(frozen=True)
+@frozen
 class TouchResult:
     """All touched points together; ``probability``: of such differences if calibration and intervals are right."""
 
@@ -43,7 +42,7 @@ class TouchResult:
     probability: float
 
 
-@dataclass(frozen=True)
+@frozen
 class CalibrationResult:
     """The calibration.
 
@@ -92,7 +91,7 @@ class CalibrationResult:
         return tuple(each.sample for each in self.suspects)
 
 
-@dataclass(frozen=True)
+@frozen
 class ErrorParts:
     """What 95 % of errors stay below, by cause alone and together."""
 
@@ -103,7 +102,7 @@ class ErrorParts:
     together: float
 
 
-@dataclass(frozen=True)
+@frozen
 class GraspResult:
     """The grasp taken.
 
@@ -137,7 +136,7 @@ class GraspResult:
 CIRCLES_MM = range(10, 610, 10)  # around an object, on which places are tried for it
 
 
-@dataclass(frozen=True)
+@frozen
 class ObjectResult:
     """A detected object, where it is in the base's frame, and what comes of it.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.collision.along import bodies_of
 from er3a.collision.matrix import solids_met
 from er3a.collision.scene import Box, Scene
@@ -65,7 +65,7 @@ def _size_and_place(void: Void) -> dict[str, float]:
     return {"litres": 1000 * void.lower, "x_mm": x, "y_mm": y, "z_mm": z}
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class _Samples:
     """The samples of a study: counts in the section's cells; joints (n, 6), rad, of the cloud, and of those that are
     looked at one by one."""

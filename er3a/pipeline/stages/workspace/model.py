@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import frozen
 from er3a.finding import Finding, is_one
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
@@ -124,7 +124,7 @@ def triple(values: Iterable[float]) -> Triple:
     return x, y, z
 
 
-@dataclass(frozen=True)
+@frozen
 class Bounds:
     """Proven bounds of a volume, m^3."""
 
@@ -137,7 +137,7 @@ class Bounds:
         return (self.lower + self.upper) / 2
 
 
-@dataclass(frozen=True)
+@frozen
 class SectionFrame:
     """Frame about axis 1 in the base frame: x, y, z as rows, and origin."""
 
@@ -157,7 +157,7 @@ def frame_of(R: Reals, origin: Reals) -> SectionFrame:
     return SectionFrame((x, y, z), triple(origin))
 
 
-@dataclass(frozen=True)
+@frozen
 class Bars:
     """Cells of the proof where joint 1 slides: bars along y of this frame, from 0 on, all so long."""
 
@@ -165,7 +165,7 @@ class Bars:
     frame: SectionFrame
 
 
-@dataclass(frozen=True)
+@frozen
 class ProofSummary:
     """The proof: ``width`` of its bounds is (upper - lower) / upper; points of samples in empty cells would refute
     it. ``bars`` is None where its cells are rings about axis 1."""
@@ -177,7 +177,7 @@ class ProofSummary:
     bars: Bars | None
 
 
-@dataclass(frozen=True)
+@frozen
 class AxisSummary:
     """Axis 1 in the base frame: a point from which heights count, its direction, its point at joint 2's height."""
 
@@ -186,7 +186,7 @@ class AxisSummary:
     shoulder_m: Triple
 
 
-@dataclass(frozen=True)
+@frozen
 class VoidSummary:
     """A void; see :class:`er3a.workspace.voids.Void`."""
 
@@ -199,7 +199,7 @@ class VoidSummary:
     holds_shoulder: bool
 
 
-@dataclass(frozen=True)
+@frozen
 class RollSummary:
     """The roll about the tool's direction: left to the last joint, or so many tried per direction. Without
     ``last_joint`` a free roll is what the arm can't choose."""
@@ -209,7 +209,7 @@ class RollSummary:
     last_joint: bool = True
 
 
-@dataclass(frozen=True)
+@frozen
 class CapabilitySummary:
     """What the tool can do in the cells of the section, in so many directions and sectors of azimuth.
 
@@ -234,7 +234,7 @@ class CapabilitySummary:
     coarse: bool
 
 
-@dataclass(frozen=True)
+@frozen
 class TaskSummary:
     """What was asked of places for the tray, as in the study."""
 
@@ -246,7 +246,7 @@ class TaskSummary:
     clear_of_axis_mm: float
 
 
-@dataclass(frozen=True)
+@frozen
 class PlaceSummary:
     """One of the best places for the tray.
 
@@ -271,7 +271,7 @@ class PlaceSummary:
 WhyNoStand = Literal["too_low", "too_small", "out_of_reach", "in_the_way"]
 
 
-@dataclass(frozen=True)
+@frozen
 class StandSummary:
     """A level surface of the scene as a stand for the tray.
 
@@ -293,7 +293,7 @@ class StandSummary:
     above: PlaceSummary | None
 
 
-@dataclass(frozen=True)
+@frozen
 class PlacementSummary:
     """Where the tray can stand: numbers of lattice points and positions, and the best places.
 

@@ -9,11 +9,12 @@ and directions, and cells are coarser.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from er3a.by_value import by_identity
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.finding import Finding, fact
@@ -61,7 +62,7 @@ _PASSING = 4
 """About one of so many of the lattice's points and directions is asked, since points that miss one are dropped."""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class CapabilityPlan:
     """What is asked: orientations, so many directions (turns, tilts) in cells (n, 4), m, with this edge (m).
 
@@ -147,7 +148,7 @@ def _cells(robot: Robot, cell: float, proven: Proven | None) -> Reals:
 LISTED = 5
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ToolCapability:
     """This part's entries of the summary, and its tables."""
 
