@@ -196,10 +196,10 @@ def _value(node: ast.expr, values: Mapping[str, CellAmount | str]) -> CellAmount
 
 def _called(name: str, values: list[CellAmount]) -> CellAmount:
     """The value of a function."""
+    if values and name in _RADIANS:
+        return replace(values[0], number=math.radians(values[0].number), unit="rad")
     if not values or any(each.variables for each in values):
         raise ValueError(f"has no number in {name}(...)")
-    if name in _RADIANS:
-        return CellAmount(math.radians(values[0].number), "rad")
     if name in _DEGREES:
         return CellAmount(math.degrees(values[0].number), "deg")
     numbers = [math.radians(each.number) if each.unit == "deg" else each.number for each in values]

@@ -55,7 +55,6 @@ OTHER_UNITS = {unit: ("mm", scale) for unit, scale in PER_MM.items() if unit != 
 SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
 LONGEST_LINK_M = 2.5  # of robots; the same number of inches is a link of 64 mm, below those of most
 SHORTEST_LINK_MM = 80.0  # longest link of an arm in mm; the same number of cm is one, too
-LONGEST_ARM_IN = 200.0  # inches; a length of five metres
 ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3), (0.5, 0.0135, 3)
 """What lengths in mm are multiples of, how nearly if they were in another unit, and how many it takes to say so."""
 ASSUMED_SLIDE_MM = 1000.0
@@ -401,14 +400,15 @@ def _twists_in_radians(rows: CsvRows, own: set[str], unsaid: bool) -> bool:
 def _likely_unit(lengths: list[float]) -> LengthUnit:
     """What lengths are in: inches if they are round millimetres in inches alone; else, below 10, metres or inches."""
 
-    def is_round(scale: float) -> bool:
-        off = [[abs(x * scale - round(x * scale / step) * step) for x in lengths] for step, _, _ in ROUND_MM]
-        return any(len(set(lengths)) >= least and max(gaps) < near for gaps, (_, near, least) in zip(off, ROUND_MM))
+    def is_round(scale: float, values: list[float]) -> bool:
+        off = [[abs(x * scale - round(x * scale / step) * step) for x in values] for step, _, _ in ROUND_MM]
+        return any(len(set(values)) >= least and max(gaps) < near for gaps, (_, near, least) in zip(off, ROUND_MM))
 
     # Arms are made in round mm: lengths that are round mm only if they are read as inches are inches.
     metres = max(lengths) < SHORTEST_ARM_MM
-    in_inches = max(lengths) < LONGEST_ARM_IN and is_round(25.4) and not is_round(1.0)
-    if in_inches and not (metres and is_round(1000.0)):
+    odd = [x for x in lengths if round(x, 1) != x]  # whole inches are whole tenths of a millimetre
+    in_inches = max(lengths) < LONGEST_LINK_M * 1000 / 25.4 and is_round(25.4, odd) and not is_round(1.0, lengths)
+    if in_inches and not (metres and is_round(1000.0, lengths)):
         return "in"
     return "mm" if not metres else "m" if max(lengths) < LONGEST_LINK_M else "cm"
 

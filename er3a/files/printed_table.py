@@ -19,9 +19,12 @@ from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import CALLED, TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
+from er3a.files.code_lists import Lists
+from er3a.files.column_order import LIBRARIES, program
 from er3a.files.csv_file import Lines
+from er3a.files.program_text import Cells, Code
 from er3a.files.table_cells import MARKS, Grid, Words, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import LIBRARIES, Cells, Code, code_grids
+from er3a.files.table_code import code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -60,8 +63,12 @@ _KIND_ELSEWHERE = re.compile(
     re.I,
 )
 """A joint that slides, said outside the table."""
-_OFFSETS = re.compile(r"\b(\w*offsets?)\s*(?:\[\d*\])?\s*=\s*[\w.(]*[\[{]([^\[\]{}]*[1-9][^\[\]{}]*)[\]}]", re.I)
-"""A list of offsets."""
+_LISTS = re.compile(
+    r"\b(\w*(?:offsets?|types?|sigma))\s*(?:\[\d*\])?\s*[:=]\s*[\w.(]*[\[{]([^\[\]{}]*[1-9a-z][^\[\]{}]*)[\]}]", re.I
+)
+"""A list of offsets, or of types."""
+_TYPES = {*words_of("r p revolute prismatic fixed")}
+_JOINTS = re.compile(r"Joint\([^;\n]*[\"'](revolute|prismatic|fixed)[\"']")
 SIGNS = {
     "modified": re.compile(
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
@@ -82,7 +89,8 @@ SIGNS = {
 """What a text says of its convention: words, a toolbox's option, or the transform of a row, of which Craig's alone has
 ``d sin(alpha)``, whatever its names (``cos(x), -sin(x), -sin(x)*y``), and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
-    r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
+    r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*"
+    r"((?:\((?:[^()\n]|\([^()\n]*\))*\)|[^=\n()])+?)"
     r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\((?:[^\W\d]{3,}[\s)]|[^()]*°\))|"
     r"\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
@@ -94,6 +102,15 @@ _CHAIN = re.compile(
     r"(?<![=!<>])=(?=[^=\n]*[-+*/^(])[ \t]*-?[\w.()]+(?:[ \t]*[-+*/^][ \t]*[\w.()]+)*[ \t]*=(?=[ \t]*[-+.\d])"
 )
 _SEVERAL = re.compile(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$")
+_NAMED_SUM = re.compile(r"[-+*/]\s*(?![qθ]|th)[^\W\d]|(?![qθ]|th)[^\W\d]\w*\s*[-+*/]")
+"""Arithmetic with a constant that has a name, as a drawing has it and no pose."""
+_IN_UNIT = re.compile(
+    r"\b(?:length|unit|distance|dimension|measure)[\w \"']*[^\n.;]{0,25}?(?:\bin\b|[:=(\[])[\s\"']{0,2}"
+    r"(mm|cm|m|inch|met(?:er|re)s?)\b",
+    re.I,
+)
+"""What lengths are in, as a text says it."""
+_LENGTH_UNIT = re.compile(r"(?<![\w.])(mm|cm|m(?!\s*=)|inch|[Mm]et(?:er|re)s?)\b")
 _CALL = re.compile(r"(?:\w+\.)*(\w+)\([\w.,\[\] ]*[^\W\d][\w.,\[\] ]*\)\s*")
 """A call of a function of names, whose value nobody knows."""
 
@@ -109,6 +126,7 @@ class PrintedTable:
 
 
 MAX_BYTES = 200_000
+LONGEST_IN_M = 2.5  # a link of a robot; the same number of mm is none
 RIGHT_WITHIN = 1e-3  # rad and deg: right angles as printed with three decimals or more
 MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
 
@@ -353,23 +371,26 @@ def _turned(grid: Grid) -> list[Grid]:
     return [[(rows[0][0], list(column)) for column in zip(*(cells for _, cells in rows))]]
 
 
-def _with_offsets(path: Path, text: str, grid: Grid) -> Grid:
-    """A program's table with a separate list of offsets as a column, if no theta is in the table."""
+def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
+    """A program's table with a separate list of types as a column, and one of offsets if no theta is in the table."""
     (line, header), *rows = grid
-    for listed in _OFFSETS.finditer(text):
-        cells, quantities = re.split(r"[,;\s]+", listed[2].strip(" ,;\n")), quantities_of(header)
-        own = "".join(cell for _, row in rows for name, cell in zip(header, row) if quantities_of([name]) == ["offset"])
-        if len(cells) != len(rows) or own.strip("0."):
+    found = [(each[1], re.findall(r"[^,;\s\"']+", each[2])) for each in _LISTS.finditer(text)]
+    for name, cells in [("type", _JOINTS.findall(text)), *found]:
+        quantities, said = quantities_of(header), {each.lower() for each in cells}
+        own = "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == ["offset"])
+        of_types = "offset" not in name.lower()
+        if len(cells) != len(rows) or (("type" in header or not said <= _TYPES) if of_types else own.strip("0.")):
             continue
-        of_angles = listed[1].lower().startswith(("th", "q", "joint", "angle"))
-        if "theta" in quantities or not of_angles or f"- {listed[1]}" in text:
+        of_angles = name.lower().startswith(("th", "q", "joint", "angle"))
+        if not of_types and ("theta" in quantities or not of_angles or f"- {name}" in text):
             raise InputError(
                 path,
-                f"line {text.count(chr(10), 0, listed.start()) + 1}",
-                f"'{listed[1]}' may be offsets of the table's joints, and no column holds them",
+                f"line {text.count(chr(10), 0, text.index(name)) + 1}",
+                f"'{name}' may be offsets of the table's joints, and no column holds them",
                 "Add them to theta, or remove that line",
             )
-        header, rows = [*header, "offset"], [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
+        header = [*header, "type" if of_types else "offset"]
+        rows = [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
     return [(line, header), *rows]
 
 
@@ -383,12 +404,7 @@ class _Table:
         self.path, self.notes, self.unsaid = path, Words(), set[str]()
         of_words = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", of_words) if from_code else without_latex(plain(of_words))
-        grid = _with_offsets(path, self.text, grid) if from_code else grid
-        # Lengths in cm alone, as the text says; those of mm and m are known by their sizes.
-        self.lengths = re.findall(
-            r"(?is)\A(?!.*(?:\bmm?\b|100\b|\.01\b|\bmet(?:er|re)s?\b)).*?\b(?:length|unit)s?\b[^\n.;]{0,20}(?:in|[:=(\[])\s?(cm)\b",
-            text,
-        )
+        grid = _with_lists(path, self.text, grid) if from_code else grid
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
         for line, cells in self.rows:
             if len(cells) != len(self.header):
@@ -403,13 +419,14 @@ class _Table:
             found[self.header.index("theta_deg")] = Heading("theta", "deg", False)
         labels = [k for k, own in found.items() if own.quantity == "joint"]
         self.headings = {k: own for k, own in found.items() if k not in labels[1:]}
-        self.column = {own.quantity: k for k, own in self.headings.items()}
+        self.column = dict[str, int]()
+        self.given = self._given(Lists(program(text)) if from_code else None)
         self._check_headings()
-        self.convention = self._stated(Code(text).text if from_code else "", text)
+        self.convention = self._stated(program(text) if from_code else None, text)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
-        self.given = self._given()
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
+        self.lengths = self._said_unit(text)
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             raise InputError(path, "types of joints", f"'{kind[0]}' is no column of the table", "Add a column of types")
@@ -419,10 +436,26 @@ class _Table:
         place = f"column {self.header[k]}"
         raise InputError(self.path, place if row is None else f"row {self.rows[row][0]}, {place}", problem, remedy)
 
+    def _said_unit(self, text: str) -> Words:
+        """The unit of lengths that a text says, if it names no other and converts none; metres are known by numbers."""
+        longest = max((abs(each.number) for name in ("a", "d") for each in self.amounts[name] if each), default=0.0)
+        units = {UNITS[each.lower()] for each in _LENGTH_UNIT.findall(text)}
+        said = _IN_UNIT.search(text) and not re.search(r"100\b|1000\b|(?<!\d)0?\.0+1\b|25\.4|1e-?3", text)
+        return [*units - {"m"}] if said and len(units) == 1 and longest > LONGEST_IN_M else []
+
+    def _values(self, k: int) -> list[float | None]:
+        """The values of a column in mm and degrees, as nearly as they are printed."""
+        unit = self.headings[k].unit
+        found = self._amounts(k)
+        return [round(_in(replace(each, unit=each.unit or unit), "deg"), 1) if each else None for each in found]
+
     def _check_headings(self) -> None:
         """Refuse two columns of one quantity, and d beside r, of which either can be the link's length."""
-        for k, own in self.headings.items():
-            if k != self.column[own.quantity]:
+        for k, own in [*self.headings.items()]:
+            first = self.column.setdefault(own.quantity, k)
+            if k != first and own.unit and self._values(k) == self._values(first):
+                del self.headings[k]  # said in another unit, too
+            elif k != first:
                 other = self.header[self.column[own.quantity]]
                 self._refuse(
                     None,
@@ -439,7 +472,7 @@ class _Table:
                 "Say which by --column: a for d and d for r (Khalil), or d for d and a for r",
             )
 
-    def _stated(self, program: str, text: str) -> Convention | None:
+    def _stated(self, code: Code | None, text: str) -> Convention | None:
         """The convention that headings, the program, or the text around the table says, a program before words."""
         if "convention" in self.header:
             return None
@@ -448,7 +481,8 @@ class _Table:
             return "modified"
         near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0] + 3])
         library = {each for library, (_, each) in LIBRARIES.items() if each and re.search(library, text)}
-        for part in (program, near, text):
+        library |= code.conventions if code else set()
+        for part in (code.text if code else "", near, text):
             said = library | {name for name, sign in SIGNS.items() if sign.search(part)}
             if len(said) > 1 and part is not text:
                 remedy = "Leave one of them, or add a column convention"
@@ -459,7 +493,7 @@ class _Table:
                     return one
         return None
 
-    def _given(self) -> Cells:
+    def _given(self, lists: Lists | None) -> Cells:
         """Values of symbols, as expressions; a symbol with two values has none."""
         # a2 = sqrt(3^2 + 4^2) = 5: what it amounts to
         self.text = re.sub(_CHAIN, "=", self.text)
@@ -468,13 +502,19 @@ class _Table:
             [_SEVERAL.sub("", self.text), *(f"{name} = {value}" for each in pairs for name, value in each)]
         )
         given = _GIVEN.findall(self.text)
+        above = len(_GIVEN.findall("\n".join(self.text.split("\n")[: self.rows[0][0] - 1])))
         given += re.findall(r"[{,]\s*([a-z]\w*\d)\s*:\s*([-\d.]+)()(?=\s*[,}])", self.text)
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
         found: Cells = {}
-        for name, value, unit in given:
+        for k, (name, value, unit) in enumerate(given):
+            own = rf"(?<![\w.]){re.escape(name)}\b"
+            if name in found and found[name] != TWO_VALUES and re.search(own, value):  # converted: a = a / 180 * pi
+                found[name] = re.sub(own, f"({found[name]})", value) if k < above else found[name]
+                continue
             made = _CALL.fullmatch(value)
             if not re.search(r"[\"']|\[(?!\d+\])|\(\)$", value) and (made is None or made[1] in CALLED):
                 value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
+                value = lists.resolved(value) if lists else value
                 found[name] = value if found.get(name, value) == value else TWO_VALUES
         plainly: Cells = {}
         for name, value in found.items():
@@ -560,7 +600,9 @@ class _Table:
                 f"'{cell}' {error}",
                 "Write a number without a unit, or arithmetic with pi and names whose values are given",
             )
+        turned = math.degrees(1.0) if found.unit == "rad" else 1.0  # a variable in degrees: theta1*pi/180
         names = {name: times for name, times in found.variables.items() if times}
+        names = {name: times if abs(times) == 1.0 else round(times * turned, 9) for name, times in names.items()}
         if len(names) > 1:
             self._refuse(row, k, f"'{cell}' holds two variables", f"Give a value: {min(names)} = ... below the table")
         for name in names if self.headings[k].quantity == "theta" else ():
@@ -699,7 +741,12 @@ class _Table:
         """Refuse angles that are no right ones, which may be those of a pose."""
         for row, each in enumerate(self.amounts["theta"]):
             right = {"deg": (90.0,), "rad": (math.pi / 2,)}.get(each.unit, (90.0, math.pi / 2)) if each else ()
-            if each and all(abs(math.remainder(each.number, quarter)) > RIGHT_WITHIN for quarter in right):
+            cell = re.sub(r"(?i)\w*pi\b|π|°|deg\w*|rad\w*|\w+\.", "", self.rows[row][1][k])
+            if (
+                each
+                and not _NAMED_SUM.search(cell)
+                and all(abs(math.remainder(each.number, quarter)) > RIGHT_WITHIN for quarter in right)
+            ):
                 self._refuse(
                     row,
                     k,

@@ -33,7 +33,7 @@ _OF_RANGES = re.compile(r"(?i)(?<![a-z])(?:min|max|range|limit)|范围|限")
 _LETTER = re.compile(r"[^\W\d_]|#")
 _LAST_WORD = re.compile(r".*\s([^\s(\[\]]+)\s*(?:[(\[]\D*)?")
 _UNIT = re.compile(r"(?:[(\[/,]|(?<=[a-zα-ω])_(?=(?:mm|cm|m|in|deg|rad)$))([^()\[\]/,]+)")
-_BEFORE = re.compile(r"[ijn]-1")
+_BEFORE = re.compile(r"[ijn](?:-1|_?m1)")
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def heading_of(text: str) -> Heading | None:
     name = re.sub(r"_(mm|cm|m|in|deg|rad)$", "", short)
     # Without the index, which says only whether the entry belongs to the joint or to the link before it.
     name = re.sub(r"[(\[](?!offset|\d)[^()\[\]]*[)\]]|/.*|,(?!offset).*", "", name)
-    name = re.sub(r"_?[ijn]-1$|(?<=.)_?[ijn]$|\*$|_k$|:$", "", name).replace("_", "")
+    name = re.sub(r"_?[ijn](?:-1|_?m1)$|(?<=.)_?[ijn]$|\*$|_k$|:$", "", name).replace("_", "")
     if name in _JOINT:
         return Heading("joint", "", False)
     last = _LAST_WORD.fullmatch(plain(text.lower()))
@@ -87,3 +87,8 @@ def heading_of(text: str) -> Heading | None:
 def quantities_of(names: Iterable[str]) -> list[str]:
     """The quantities of those headings that are a D-H table's."""
     return [found.quantity for name in names if (found := heading_of(name))]
+
+
+def place_of(name: str) -> str:
+    """What a column is, whether theta or its offset."""
+    return next(iter(quantities_of([name])), name).replace("offset", "theta")

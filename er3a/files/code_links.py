@@ -1,0 +1,260 @@
+"""Rows of a D-H table that a program makes by calls and records: ``RevoluteDH(d=0.29)``, ``{"a": 0, ...}``."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from er3a.files.arithmetic import words_of
+from er3a.files.code_brackets import CodeGroup, parts
+from er3a.files.code_lists import Lists
+from er3a.files.column_order import parameters_of, signatures
+from er3a.files.program_text import Cells, Code, is_row, record_of, row_cells
+from er3a.files.table_cells import Grid, Words
+from er3a.files.table_headings import heading_of, quantities_of
+
+_TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
+
+
+_OF_LINK = [*words_of("theta d a alpha sigma offset")]
+
+
+_ORDERS = words_of(
+    "dhlink=d,alpha,theta,a,sigma revolutedh=d,a,alpha,offset revolutemdh=d,a,alpha,offset "
+    "prismaticdh=theta,a,alpha,offset prismaticmdh=theta,a,alpha,offset"
+)
+"""The order of arguments without names, by the function."""
+
+
+_ADDED = r"(?m)\.extend\(|\)\s*\]\s*\*\s*\d|^\s*(\w+)[\[({]\d+[\])}]\s*=\s*\1[\[({]\d+[\])}]\s*(?:;|$)"
+"""Links that no call makes: of another list, ``[...] * 2``, ``L(2) = L(1)``."""
+
+
+_OF_LOOP = ("is of a loop, or of another program", "Write a row for each joint")
+
+
+def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
+    """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row, and records
+    ``{"a": 0, "alpha": 90, ...}``, such calls of other functions; and the lists, of which they take elements."""
+    rows, own, unread = list[_Link](), list[_Link](), list[CodeGroup]()
+    records = [_Link("", each.start, record_of(each)) for each in code.groups if each.bracket == "{"]
+    lists = Lists(code)
+    for each in code.groups:
+        named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
+        if each.bracket != "(" or named is None:
+            continue
+        target, function = named.groups()
+        order, toolbox = signatures(code).get(function, []), _TOOLBOX.fullmatch(function)
+        of_lists = toolbox or function == "DH"
+        texts = lists.written_out(each) if of_lists or order else [each.inside]
+        if of_lists and not texts:
+            code.refuse(each.start, each.inside, *_OF_LOOP)
+        made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
+        made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells))]
+        if toolbox and "ikpy" in code.text:  # whose theta is added to the joint's angle
+            made = [cells | {"offset": cells["theta"], "theta": "0"} for cells in made]
+        target = _target(each, target or "", bool(toolbox) and len(texts) == 1)
+        for k, cells in enumerate(made):
+            name = f"{target}.{k}" if target and len(made) > 1 else target
+            (own if order and not of_lists else rows).append(_Link(name, each.start, cells))
+        if toolbox and not (made or order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
+            unread.append(each)
+    if "Frame::DH(" in code.text:
+        _segments(code, rows)
+    if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
+        code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
+    if not lists.taken:
+        rows, own = sorted(rows + own, key=lambda row: row.place), []
+    _assigned(code, rows)
+    if rows and (re.search(_ADDED, code.text) or len(rows) == 1 or len({*lists.loops}) < len(lists.loops)):
+        code.refuse(rows[0].place, ", ".join(_constants(rows[0].cells)), *_OF_LOOP)
+    if not lists.taken:
+        rows = sorted([*rows, *(row for row in records if is_row(row.cells))], key=lambda row: row.place)
+    grids = [_grid([(code.line(row.place), row.cells) for row in each]) for each in (*_arms(code, rows), own)]
+    return grids[:-1], grids[-1:] if len(own) > 1 else [], lists
+
+
+def _target(call: CodeGroup, name: str, named: bool) -> str:
+    """The name of a link, with the list that it is appended to or put in; ``named``: whether it may have its own."""
+    added = re.search(r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", call.before, re.S)
+    name = f"{added[1]}[{call.start}" if added else re.sub(r"\s", "", name)
+    return "" if name.isidentifier() and not named else name
+
+
+def _arms(code: Code, rows: list[_Link]) -> list[list[_Link]]:
+    """The links of each arm: those that a list names or holds, and the rest by their lists."""
+    names = {row.name: row for row in rows}
+    chosen = [row_cells(each.inside) for each in code.groups if each.bracket == "["]
+    arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
+    taken = [row for each in arms for row in each]
+    held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
+    for one in [each for each in held if len(each) > 1] or [rows]:
+        arms += [each for each in _begun_again(one) if not taken or (_list_of(each[0]) and each[0] not in taken)]
+    return arms
+
+
+def _segments(code: Code, rows: list[_Link]) -> None:
+    """Say what moves in KDL's ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``: its joint comes first."""
+    joints = dict(re.findall(r"\bJoint\s+(\w+)\s*[({=]([^;\n]*)", code.text))
+    for each in code.groups:
+        if re.search(r"\bSegment\s*$", each.before):
+            said = " ".join(joints.get(part, part) for part in parts(each.inside))
+            own = [row for row in rows if each.start < row.place < each.end]
+            kinds = [kind for kind in _KDL if re.search(rf"\b{kind}\b", said)]
+            if not own or len(kinds) != 1:
+                code.refuse(
+                    each.start,
+                    each.inside,
+                    "is no row of a table",
+                    "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out",
+                )
+            for row in own:
+                row.cells.update(type=_KDL[kinds[0]], convention="standard")
+
+
+_KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
+
+
+def _of_signature(order: Words, text: str) -> Cells:
+    """A row of a function's arguments; none of its definition."""
+    cells = {name: part.strip("\"'") for name, part in zip(order, parts(text))}
+    return {} if len(cells) < len(order) or parameters_of(text) == order else cells
+
+
+def _says_numbers(code: Code, cells: Cells) -> bool:
+    """Whether a row holds numbers or names of numbers, and no elements of lists."""
+    texts = _constants(cells)
+    return not any(re.search(r"\[(?!\d+\])|\w(?<!2)\(\w+\s*,\s*\w+\)|\bc\(", cell) for cell in texts) and any(
+        not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(rf"(?m)^\s*{re.escape(cell)}\s*=[^\[{{\n]+$", code.text)
+        for cell in texts
+    )
+
+
+def _constants(cells: Cells) -> Words:
+    """The numbers of a row without theta, which can be an element ``q[0]``."""
+    return [cell for name, cell in cells.items() if quantities_of([name]) not in ([], ["theta"], ["type"])]
+
+
+@dataclass(frozen=True)
+class _Link:
+    name: str
+    place: int
+    cells: Cells
+
+
+def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
+    """Links by the arms that they belong to: a name that is used again begins another arm, another list does too."""
+    arms: dict[tuple[str, int], list[_Link]] = {}
+    lists = {_list_of(row) for row in rows if row.name}
+    for k, row in enumerate(rows):
+        uses = [other.name for other in rows[:k] if row.name].count(row.name)
+        one = _list_of(row) if row.name or len(lists) > 1 else "".join(lists)
+        arms.setdefault((one, uses), []).append(row)
+    return [*arms.values()]
+
+
+def _list_of(row: _Link) -> str:
+    """The name of the list that holds a link ``L(2)``; "" if it is in none."""
+    return "".join(re.findall(r"(.*)[(\[{]", row.name))
+
+
+def _arguments(function: str, text: str) -> Cells | None:
+    """A row's cells by their headings; None if the call makes no link."""
+    low, toolbox = function.lower(), _TOOLBOX.fullmatch(function)
+    given, words, cells = Words(), Words(), Cells()
+    pending = ""
+    for part in parts(text):
+        key, is_named, value = part.partition("=")
+        quoted = re.fullmatch(r"""["'](\w*)["']""", part)
+        if is_named and re.fullmatch(r"\w+\s*", key):
+            cells[_argument(key)] = value.strip(" \"'")
+        elif pending:
+            cells[pending], pending = part, ""
+        elif _FLAGS.fullmatch(word := part.strip("\"'")):
+            words.append(word.lower())
+        elif quoted:
+            pending = _argument(quoted[1])
+        elif part:
+            given.append(part)
+    if toolbox is None:
+        return cells if is_row(cells) and not given else None
+    if len(given) == 1 and given[0].startswith("["):
+        order = words_of("alpha a theta d sigma") if function == "link" else _OF_LINK
+        given = row_cells(given[0][1:-1])
+        if len(given) < 4:
+            return None
+        cells |= dict(zip(order, given))
+    elif low in _ORDERS and len(given) <= len(order := _ORDERS[low].split(",")):
+        cells |= dict(zip(order, given))
+    elif given or (low == "link" and not cells):
+        return None
+    return _of_toolbox(low, words, cells)
+
+
+def _argument(key: str) -> str:
+    """The name of an argument, ``α`` and ``link_length`` as that of their quantity; letters mean what they are."""
+    own = heading_of(key)
+    named = own and own.quantity in _OF_LINK and (len(key.strip()) > 1 or not key.isascii())
+    return own.quantity if own and named else key.strip().lower()
+
+
+_FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
+
+
+def _of_toolbox(function: str, words: Words, cells: Cells) -> Cells:
+    """A row of a toolbox: what is left out is 0; theta of a joint that turns, and d of one that slides, is its own."""
+    words += [flag for flag in ("mdh", "flip") if cells.pop(flag, "0").lower() in ("1", "true")]
+    said = " ".join([function, *words])
+    slides = "prismatic" in said or cells.get("sigma", "0") in ("1", "1.0")
+    slides |= function == "link" and "theta" in cells and "d" not in cells
+    offset = cells.pop("offset", "0")
+    row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
+    row |= {
+        "offset": offset,
+        "type": "revolute",
+        "convention": "modified" if "mod" in said or "mdh" in said else "standard",
+    }
+    if slides:  # its own d is no part of the transform
+        row |= {"d": offset, "offset": "", "type": "prismatic"}
+    return row | {"direction": "-1"} if "flip" in words else row
+
+
+def _assigned(code: Code, rows: list[_Link]) -> None:
+    """Carry out what is set after a link was made: ``L(2).offset = -pi/2``."""
+    pattern = r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\s*=(?!=)\s*([^;\n]+)"
+    for found in re.finditer(pattern, code.text) if rows else ():
+        name = f"{found[1]}.{found[2]}"
+        given = [(row, key) for row in rows for key, cell in row.cells.items() if name in (cell, f"{row.name}.{key}")]
+        for row, key in given:
+            row.cells[key] = found[3].strip()
+        if not given:
+            code.refuse(found.start(), name, "is set for a link that is not found", "Write it into the link's call")
+
+
+def listed_rows(code: Code) -> list[Grid]:
+    """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated; if
+    such keys hold lists, these are columns (:func:`columns_of`)."""
+    tables = [[(0, Cells())]]
+    level = 0
+    for number, line in enumerate(code.text.split("\n"), 1):
+        found = re.fullmatch(r"(\s*)(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
+        if found is None:
+            continue
+        indent, dash, key, value = found.groups()
+        key, rows = key.lower(), tables[-1]
+        numbered = re.search(r"\d", key)
+        if len(indent) < level and not value and not numbered:  # the name of another list
+            tables.append([(number, {})])
+        elif dash or key in rows[-1][1] or not value:
+            rows.append((number, {"joint": key} if not value and numbered else {}))
+            level = len(indent)
+        if value:
+            rows[-1][1][key] = value.strip(" \"'")
+    full = [[row for row in rows if is_row(row[1])] for rows in tables]
+    return [_grid(rows) for rows in full if len(rows) > 1]
+
+
+def _grid(rows: list[tuple[int, Cells]]) -> Grid:
+    header = list(dict.fromkeys(key for _, cells in rows for key in cells))
+    blank = ["1" if key == "direction" else "" for key in header]
+    return [(0, header), *((line, [*map(cells.get, header, blank)]) for line, cells in rows)]

@@ -1,0 +1,257 @@
+"""Lists of a program by their names: as columns of a D-H table, and what calls take of them, written out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from er3a.errors import InputError
+from er3a.files.arithmetic import amount_of, words_of
+from er3a.files.code_brackets import CodeGroup, parts
+from er3a.files.program_text import (
+    PART,
+    Cells,
+    Code,
+    closed_up,
+    filled,
+    is_row,
+    list_name,
+    record_of,
+    row_cells,
+    rows_of,
+)
+from er3a.files.table_cells import Grid, Words
+from er3a.files.table_headings import heading_of, place_of, quantities_of
+
+NamedList = tuple[str, Words, int, str]
+"""A list's name, its cells, its line, and ``:`` or ``=``."""
+
+
+def named_lists(code: Code) -> Iterator[NamedList]:
+    """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
+    for group in code.groups:
+        name = re.search(
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?\]?(?:\[\d*\]|\(1:\w+\))?\s*(?::(?: *\[\w+; *\d+\] *|[^=:\n\"'\d]*)(?==))?"
+            r"([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[\d*\]\w+)?[\"']?$",
+            group.before,
+        )
+        inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
+        rows = re.search(
+            r"[\[{:%]|(?<!\w)\([^()]*,|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
+            re.sub(r"\w\[[^\[\]]*\]|\w+::", "q", closed_up(inside)),
+        )
+        if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
+            continue
+        after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+|=(?!=))?", code.text[group.end + 1 :])
+        if after and after[1] == "=":  # the type of what follows
+            continue
+        cells = row_cells(inside.replace(";", ",").replace("\n", " "))
+        cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
+        yield name[1], cells, code.line(group.start), name[2]
+
+
+def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
+    """A table of columns by the names of their lists: ``a = [0, 0.27, ...]``, ``"a": [0, ...]``; theta is no pose."""
+    columns: dict[str, NamedList] = {}  # heading, cells, line, the list's name
+    for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
+        bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
+        names = (name, bare, bare.rpartition("_")[2])
+        heading = next(filter(None, map(heading_of, names)), None)
+        quantity = heading.quantity if heading else name
+        if quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
+            continue  # values of joints, or their limits
+        text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b|π|2rad|radians", "π", " ".join(cells), flags=re.I)
+        if quantity == "theta" and mark == "=" and not re.search(r"[^\W\dπ]", text):
+            quantity = "pose" if name != "q" and re.search("[1-9π]", text) else ""
+            quantity = "offset" if re.search(_SUMMED.replace("NAME", name), program) else quantity
+        quantity = "alpha" if quantity == "a" and "π" in text else quantity
+        of_others = name in "Ll" and columns.get("a", "r")[-1] not in "rR"
+        if quantity not in _OF_VECTORS or not cells or of_others:
+            continue
+        title = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
+        _, first, place, other = columns.setdefault(quantity, (title, cells, line, name))
+        if first != cells and quantity not in ("theta", "pose"):
+            raise InputError(
+                None,
+                f"line {line}",
+                f"'{name}' is another list of {quantity} than '{other}' of line {place}",
+                "Give the lists of one arm, each with its own name",
+            )
+    if not {"a", "alpha", "d"} <= {*columns}:
+        return []
+    *_, place, name = columns.pop("pose", ("", 0, ""))
+    if name and "theta" not in columns:
+        raise InputError(
+            None,
+            f"line {place}",
+            f"'{name}' may be offsets of the joints' angles, or a pose",
+            "Name it offset if theta = q + offset, or remove it",
+        )
+    titles, lengths, places, _ = zip(*columns.values())
+    if len({*map(len, lengths)}) > 1:
+        entries = ", ".join(f"{name} {len(cells)}" for name, (_, cells, _, _) in columns.items())
+        raise InputError(
+            None, f"line {max(places)}", f"different numbers of entries: {entries}", "Give one for each joint"
+        )
+    return [[(0, [*titles]), *((1, list(row)) for row in zip(*lengths))]]
+
+
+_USED = re.compile(
+    r"[\[(,;]\s*-?(?:al(?:p|ph|f)a?)[_({\[]*\d[)}\]]*+\s*[,;\])]|\b(?:q|th(?:eta)?)_?[\[({]?\d[\])}]?\s*[-+]\s*(?:\d|\w*\.?pi\b)",
+    re.I,
+)
+"""Symbols that are entries of a matrix, or a sum with a joint's variable."""
+
+
+_SUMMED = r"\bNAME[\[(]\w+[\])]\s*\+\s*\w*(?:q|th|joint)|(?:q|th\w*|joint\w*)[\[(]\w+[\])]\s*\+\s*NAME\b"
+"""A list that is added to values of joints."""
+
+
+_OF_VECTORS = words_of("a alpha d theta offset type direction pose")
+
+
+def numbered_lists(code: Code) -> Iterator[NamedList]:
+    """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
+    or ``DH_0_ALPHA = 90``, whose theta is the table's."""
+    name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)"
+    name += r"([_({\[]*)(\d{1,2})[)}\]]*(?(1)\1)"
+    pattern = rf"{name}\s*([:=])(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s\[{{](?:::|[^,}}\n;:=!])*)"
+    spellings: dict[str, dict[str, dict[int, tuple[str, str, int]]]] = {}  # value, mark and place of each number
+    text = re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text)
+    for each in re.finditer(pattern, text, re.I):
+        _, name, bracket, number, mark, value = each.groups()
+        for spelling in (f"{bracket}{name.isupper()}", "~"):  # D1 = 0.3; d(1) = D1
+            entries = spellings.setdefault(spelling, {}).setdefault(name.lower(), {})
+            entries.setdefault(int(number), (value.strip(), mark, each.start()))
+    whole = [one for _, one in sorted(spellings.items()) if {*quantities_of(one)} >= {"alpha", "a", "d"}]
+    if not whole:
+        return
+    found = whole[-1] | whole[0]
+    quantities = dict(zip(quantities_of(found), found.values()))
+    if len(found) == 3 and "DH_A" not in code.text and (used := _USED.search(code.text)):
+        code.refuse(used.start(), used[0], "is no column of a table", "Write a list of theta or offset")
+    for name, entries in found.items():
+        cells = {k: value for k, (value, _, _) in entries.items()}
+        _, mark, place = entries[max(entries)]
+        of_link = quantities["alpha" if place_of(name) in ("alpha", "a") else "d"]
+        first = min(entries) if len(entries) == len(of_link) else min(of_link)
+        gaps = {*range(first, max(entries) + 1)} - {*entries}
+        if gaps and (mark != ":" or place_of(name) != "theta"):
+            code.refuse(place, f"{name}{min(gaps)}", "is missing", "Give one for each joint")
+        cells |= {k: f"{name}{k}" for k in gaps}  # what is not replaced stays a variable
+        before = "(i-1)" if min(of_link) < max(map(min, found.values())) else ""
+        yield name + before, [cells[k] for k in sorted(cells)], code.line(place), mark
+
+
+_LOOP = re.compile(
+    r"\bfor\b\s*\(?\s*(?:(?:const|let|auto|u?int\w*|size_t|unsigned)\s+)*([\w, ()]+?)\s*(?:\bin\b|=|:)\s*([^\n]*)"
+)
+
+
+MOST_PASSES = 99  # more than any arm has links
+
+
+_INDEX = re.compile(r"@\d+|[\[({][^\[\](){}]*[\])}]|\.\w+")
+
+
+_REFERENCE = re.compile(rf"(?<![\w.'\"@])([^\W\d]\w*)((?:{_INDEX.pattern})+)")
+
+
+_LENGTH = re.compile(r"(?:len|size|length|numel|height)\(\s*(\w+)\b(?:[^()]|\([^()]*\))*\)|(\w+)\.shape\[0\]")
+
+
+_RANGE = re.compile(r"range\((?:(\d+), *)?(\w+)\)|(\d+)[ ]*:[ ]*(\w+)|(\d+);[^;<]*<(=?)[ ]*(\w+);.*")
+
+
+_COUNT = re.compile(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?[ \t]*$")
+
+
+_LANGUAGE = r"(?m)^\s*end\b|\b(?:import|def|range|zip|np|float|double|const|let|var|auto|self)\b"
+
+
+class Lists:
+    """The lists, matrices and lists of records of a program by their names, and which ones links take."""
+
+    def __init__(self, code: Code):
+        self.code, self.taken, self.loops = code, set[str](), Words()
+        self.said = re.search(_LANGUAGE, code.text)  # what counts from 0 or, as Julia, from 1
+        self.first = int(bool(self.said and "end" in self.said[0]))
+        joints = () if "Frame::DH(" in code.text else ["theta"]  # which KDL has as a constant
+        lists = (each for each in named_lists(code) if each[1] and quantities_of(each[:1]) != joints)
+        self.values: dict[str, Any] = {name: cells for name, cells, _, _ in lists}
+        for group in code.groups:
+            if len(rows := rows_of(code, group)) > 1 and (name := list_name(group)) not in self.values:
+                inner = [record_of(each) for each in code.groups if group.start < each.start < group.end]
+                self.values[name] = [each for each in inner if is_row(each)] or [row for _, row in rows]
+            columns = [self.values.get(cell.strip("'"), [cell] * MOST_PASSES) for cell in row_cells(group.inside)]
+            if len(columns) > 2 and re.fullmatch(r"(?:\s*\w+',?){3,}\s*", group.inside):  # [theta' d' a' alpha']
+                self.values[list_name(group)] = [list(row) for row in zip(*columns)]
+
+    def written_out(self, call: CodeGroup) -> Words:
+        """The arguments of a call as often as it is carried out, with the elements of lists in place of their names."""
+        code, passes = self.code.text, [call.inside]
+        around = [each for each in self.code.groups if each.start < call.start < call.end < each.end]
+        built = [found for each in around if (found := _LOOP.search(code, call.end, each.end))]
+        loops = [
+            (code[loop.end() : call.start], *loop.groups()) for loop in built or _LOOP.finditer(code, 0, call.start)
+        ]
+        for body, target, over in loops[-1:] or [("", "i", "n")]:
+            names, over = re.findall(r"\w+", target), over.strip(" :{")
+            named = Cells()
+            for row in PART.finditer(body):
+                value = row[2] if re.fullmatch(r"[\w.\[\]]+", row[2]) else f"({row[2]})"
+                own = re.findall(r"\w+", row[1])
+                named |= {name: f"{value}@{k}" if own[1:] else value for k, name in enumerate(own)}
+            text = filled(call.inside, named)
+            outside = re.search(r"\b(?:def|function)\b", body) or not {*names} & {*re.findall(r"\w+", text)}
+            if built or not outside:
+                branch = re.search(r"\bif\b", f"{body} {over}")
+                made = [] if branch else [filled(text, each) for each in self._passes(text, names, over)]
+                # A loop over poses or time goes through no list.
+                passes = made or ([] if loops and {*re.findall(r"\w+", text)} & {*self.values} else passes)
+                self.loops += {each[1] for each in _REFERENCE.finditer("".join(passes[:1])) if each[1] in self.values}
+        return [self.resolved(each).lstrip("*") for each in passes]
+
+    def resolved(self, text: str) -> str:
+        """A text with elements of lists in place of their names; an element may be a sum of elements."""
+        return _REFERENCE.sub(self._element, _REFERENCE.sub(self._element, text))
+
+    def _passes(self, text: str, names: Words, over: str) -> Iterator[Cells]:
+        """What the names of a loop stand for in each pass; a row may be unpacked into the last ones. If an unknown name
+        says how many passes there are, they go through all of the lists that a call takes."""
+        counts = {name: len(value) for name, value in self.values.items()}
+        known = dict(_COUNT.findall(self.code.text))
+        bounds = _LENGTH.sub(lambda found: str(counts.get(found[1] or found[2], "n")), over)
+        ranged = _RANGE.fullmatch(re.sub(r"[^\W\d]\w*", lambda found: known.get(found[0], found[0]), bounds))
+        lists = [] if ranged else [name for name in re.findall(r"\w+", over) if name in counts]
+        every = min([counts[name] for name in lists or re.findall(r"\w+", text) if name in counts], default=0)
+        first, last = 0, every if re.match(r"enumerate\(|zip\(|[\w.]+$", over) else 0
+        if ranged:
+            first, end = int(ranged[1] or ranged[3] or ranged[5] or 0), ranged[2] or ranged[4] or ranged[7]
+            last = int(end) + bool(ranged[3] or ranged[6]) if end.isdigit() else first + every
+        for k in range(first, min(last, MOST_PASSES)):
+            found = [str(k)] * ("enumerate(" in over or not lists) + [f"{name}@{k}" for name in lists]
+            rest = [f"{found[-1]}@{part}" for part in range(len(names) - len(found) + 1)]
+            yield dict(zip(names, found[:-1] + rest if len(rest) > 1 else found))
+
+    def _element(self, found: re.Match[str]) -> str:
+        """An element of a list, or a row of a matrix; what is no list stays as it is."""
+        value: Any = self.values.get(found[1])
+        key = "-"
+        try:
+            for index in _INDEX.findall(found[2]):
+                for part in parts(index[1:-1]) if index[0] in "[({" else [index]:
+                    key = part.strip("'\"@.").lower()
+                    if isinstance(value, list) and key != ":":
+                        key = str(int(amount_of(key).number) - {"[": self.first, "@": 0}.get(index[0], 1))
+                    value = value if key == ":" else value[int(key) if isinstance(value, list) else key]
+        except (KeyError, IndexError, ValueError, TypeError):
+            key = "-"
+        if key[0] == "-":
+            return found[0]
+        self.taken.add(found[1])
+        if isinstance(value, str):
+            return f"({value})" if re.search(r"[-+*/]", value) else value
+        row = ", ".join(value)
+        return row if found.string[: found.start()].rstrip()[-1:] in ("[", "*") else f"[{row}]"
