@@ -23,19 +23,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from er3a.by_value import ByValue
-from er3a.collision.convex import ROOM, TOUCHING, cores_distance
+from er3a.collision.convex import EXACT, ROOM, TOUCHING, cores_distance
 from er3a.geometry.vectors import Vector, fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 96 levels deep at most
-FIRST = 14  # corners, with which the choice of few of a hull begins
+FIRST, TRIED = 14, 1000  # corners, with which the choice of few of a hull begins, and among about how many it goes on
+GROWN = 24  # corners of each hull at most, among which the nearest points of two are looked for
 EDGE = 1e-9  # m; gaps along directions across two edges count from here on, as parallel edges give none
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
@@ -53,6 +55,8 @@ class TriangleTree(ByValue):
     corner : (F, 3, 3), m
     shell : (F,), a number of the closed shell that a triangle belongs to, 0 for one that is not closed
     probe : (S, 3), m, a point of each shell that is not inside another one
+    hull : (H, 3), m, the corners of its hull, none if it is flat
+    beside : (H, 2), of each corner where its neighbours on the hull begin and end in ``edge`` (E,)
     """
 
     box: Reals
@@ -61,12 +65,16 @@ class TriangleTree(ByValue):
     corner: Reals
     shell: Integers
     probe: Reals
+    hull: Reals
+    beside: Integers
+    edge: Integers
 
 
 class Trees(NamedTuple):
     """The trees of the surfaces among B bodies, as kernels take them: as :class:`TriangleTree`, one after the other.
 
-    ``root`` (B,): the first box of each body's tree, -1 for convex bodies; ``first``, ``last`` (B,): its probes.
+    ``root`` (B,): the first box of each body's tree, -1 for convex bodies; ``first``, ``last`` (B,): its probes;
+    ``start`` (B,): the first corner of its hull, -1 for none.
     """
 
     root: Integers
@@ -76,8 +84,12 @@ class Trees(NamedTuple):
     corner: Reals
     shell: Integers
     probe: Reals
+    hull: Reals
+    beside: Integers
+    edge: Integers
     first: Integers
     last: Integers
+    start: Integers
 
 
 def tree_of(points: Reals, faces: Integers) -> TriangleTree:
@@ -134,14 +146,26 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
         ends = np.stack([cut, begin + sizes], axis=1).ravel()
     probe, around = points[faces.ravel()[last]], np.empty(len(last), np.int64)
     trees = np.concatenate(boxes), np.concatenate(slims), np.concatenate(children)
-    tree = TriangleTree(*trees, corner, shell, probe)
+    tree = TriangleTree(*trees, corner, shell, probe, *_hull(points[np.unique(faces)]))
     shells_around(trees_of([tree]), probe, around)
     return replace(tree, probe=probe[(around == 0) | (around == shell[last // 3])])
 
 
+def _hull(points: Reals) -> tuple[Reals, Integers, Integers]:
+    """The corners of a hull, and which are beside which, as a tree has them."""
+    try:
+        hull = scipy.spatial.ConvexHull(points)
+    except scipy.spatial.QhullError:  # flat
+        return points[:0], np.empty((0, 2), np.int64), np.empty(0, np.int64)
+    corners = np.searchsorted(hull.vertices, hull.simplices, sorter=(order := hull.vertices.argsort()))
+    pairs = np.unique(corners[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2), axis=0)
+    ends = np.cumsum(np.bincount(pairs[:, 0]))
+    return points[hull.vertices[order]], np.stack([np.append(0, ends[:-1]), ends], axis=1), pairs[:, 1]
+
+
 def _bounds(corner: Reals, starts: Integers) -> Reals:
     """Middle and half the edges (n, 2, 3) of boxes around triangles (F, 3, 3), each from one of ``starts`` on."""
-    lower, upper = (bound.reduceat(bound.reduce(corner, axis=1), starts) for bound in (np.fmin, np.fmax))
+    lower, upper = (bound.reduceat(reduce(bound, corner.swapaxes(0, 1)), starts) for bound in (np.fmin, np.fmax))
     return np.stack([(lower + upper) / 2, (upper - lower) / 2], axis=1)
 
 
@@ -185,9 +209,10 @@ def outer_corners(points: Reals, most: int = 64) -> Reals:
             return np.asarray(corners)
         first = np.unique((fibonacci_sphere(FIRST) @ corners.T).argmax(axis=1))
         hull = scipy.spatial.ConvexHull(corners[first], incremental=True)
+        tried = corners[:: -(-len(corners) // TRIED)]
         while len(hull.points) < most:
-            away = (hull.equations[:, :3] @ corners.T + hull.equations[:, 3:]).max(axis=0)
-            hull.add_points(corners[[away.argmax()]])
+            away = (hull.equations[:, :3] @ tried.T + hull.equations[:, 3:]).max(axis=0)
+            hull.add_points(tried[[away.argmax()]])
     except scipy.spatial.QhullError:
         return box
     kept, faces = hull.points[hull.vertices], hull.equations
@@ -211,25 +236,27 @@ def trees_of(trees: Sequence[TriangleTree | None]) -> Trees:
     """
     own = {id(tree): tree for tree in trees if tree is not None}
     kept = list(own.values())
-    sizes = [np.cumsum([0, *(len(getattr(tree, key)) for tree in kept)]) for key in ("box", "corner", "probe")]
+    keys = ("box", "corner", "probe", "hull", "edge")
+    begin = {key: np.cumsum([0, *(len(getattr(tree, key)) for tree in kept)]) for key in keys}
     place = {key: k for k, key in enumerate(own)}
-    child = []
-    for k, tree in enumerate(kept):
-        leaf = tree.child[:, :1] < 0
-        child.append(np.where(leaf, tree.child + np.array([0, sizes[1][k]]), tree.child + sizes[0][k]))
     number = [place.get(id(tree), -1) for tree in trees]
-    root, first, last = (
-        np.array([bounds[k + more] if k >= 0 else -1 for k in number], np.int64)
-        for bounds, more in ((sizes[0], 0), (sizes[2], 0), (sizes[2], 1))
+    root, first, last, start = (
+        np.array([begin[key][k + more] if k >= 0 else -1 for k in number], np.int64)
+        for key, more in (("box", 0), ("probe", 0), ("probe", 1), ("hull", 0))
     )
-    none = {"box": (0, 2, 3), "slim": (0, 5, 3), "corner": (0, 3, 3), "probe": (0, 3), "shell": (0,)}
-    joined = {
-        key: np.concatenate([getattr(tree, key) for tree in kept]) if kept else np.empty(shape, float)
-        for key, shape in none.items()
-    }
-    joined["shell"] = joined["shell"].astype(np.int64)
-    joined["child"] = np.concatenate(child) if kept else np.empty((0, 2), np.int64)
-    return Trees(root=root, first=first, last=last, **joined)
+    start[[k >= 0 and not len(kept[k].hull) for k in number]] = -1
+    reals = {"box": (0, 2, 3), "slim": (0, 5, 3), "corner": (0, 3, 3), "probe": (0, 3), "hull": (0, 3)}
+    integers = {"shell": (0,), "edge": (0,), "beside": (0, 2), "child": (0, 2)}
+    parts = {key: [getattr(tree, key) for tree in kept] for key in (*reals, *integers)}
+    for k, child in enumerate(parts["child"]):
+        leaves = child + np.array([0, begin["corner"][k]])
+        parts["child"][k] = np.where(child[:, :1] < 0, leaves, child + begin["box"][k])
+        parts["beside"][k] = parts["beside"][k] + begin["edge"][k]
+        parts["edge"][k] = parts["edge"][k] + begin["hull"][k]
+    none = {key: np.empty(shape) for key, shape in reals.items()}
+    none |= {key: np.empty(shape, np.int64) for key, shape in integers.items()}
+    joined = {key: np.concatenate(each) if len(each) > 1 else [*each, none[key]][0] for key, each in parts.items()}
+    return Trees(root=root, first=first, last=last, start=start, **joined)
 
 
 @inner_kernel
@@ -402,6 +429,60 @@ def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, M: Reals) -> 
 
 
 @inner_kernel
+def _farthest(trees: Trees, at: int, x: float, y: float, z: float) -> int:
+    """The corner of a hull that is farthest along a direction: from corner to corner uphill, from one of them on."""
+    hull, best = trees.hull, -np.inf
+    while True:
+        here = at
+        if best == -np.inf:
+            best = x * hull[at, 0] + y * hull[at, 1] + z * hull[at, 2]
+        for edge in range(trees.beside[here, 0], trees.beside[here, 1]):
+            n = trees.edge[edge]
+            value = x * hull[n, 0] + y * hull[n, 1] + z * hull[n, 2]
+            if value > best:
+                best, at = value, n
+        if at == here:
+            return at
+
+
+@inner_kernel
+def hulls_distance(trees: Trees, a: int, T: Reals, b: int, S: Reals, room: Reals, near: Reals, far: float) -> float:
+    """Distance of the hulls of two surfaces.
+
+    It is that of a few corners of either; the farthest ones towards each other join them, until none is nearer.
+
+    Parameters
+    ----------
+    a, b : numbers of the bodies
+    T, S : (4, 4), m, place them
+    room : (ROOM, 3), scratch memory
+    near : (2, 3), m, with a first guess of the nearest points, gets these
+    far : m; of hulls farther away any number from ``far`` to the distance may be returned
+
+    Returns
+    -------
+    distance : m; 0 where they overlap; below 0 where it is not known, as of flat surfaces
+    """
+    i, j, points, half = trees.start[a], trees.start[b], np.empty((2 * GROWN, 3)), GROWN + int(0)  # noqa: RUF046, UP018
+    x, y, z, distance = near[1, 0] - near[0, 0], near[1, 1] - near[0, 1], near[1, 2] - near[0, 2], np.inf
+    for count in range(0 if min(i, j) < 0 else GROWN):
+        i = _farthest(trees, i, x * T[0, 0] + y * T[1, 0] + z * T[2, 0], x * T[0, 1] + y * T[1, 1] + z * T[2, 1], x * T[0, 2] + y * T[1, 2] + z * T[2, 2])
+        j = _farthest(trees, j, -x * S[0, 0] - y * S[1, 0] - z * S[2, 0], -x * S[0, 1] - y * S[1, 1] - z * S[2, 1], -x * S[0, 2] - y * S[1, 2] - z * S[2, 2])
+        points[count, 0], points[count, 1], points[count, 2] = _moved(T, trees.hull, i)
+        points[half + count, 0], points[half + count, 1], points[half + count, 2] = _moved(S, trees.hull, j)
+        size, gap = np.sqrt(x * x + y * y + z * z), 0.0
+        for r, along in enumerate((x, y, z)):
+            gap += along * (points[half + count, r] - points[count, r])
+        if count and (gap > far * size or distance * size - gap <= EXACT * size):
+            return max(gap / size, 0.0) if gap > far * size else distance
+        distance = cores_distance(points, (i * 0, i * 0 + count + 1, half, half + count + 1), 0.0, 0.0, room, near, np.inf)
+        if distance == 0:
+            return 0.0
+        x, y, z = near[1, 0] - near[0, 0], near[1, 1] - near[0, 1], near[1, 2] - near[0, 2]
+    return -1.0
+
+
+@inner_kernel
 def surface_distance(  # noqa: C901, PLR0912
     trees: Trees,
     a: int,
@@ -417,7 +498,7 @@ def surface_distance(  # noqa: C901, PLR0912
 
     Parameters
     ----------
-    a, b : numbers of the bodies; b is a surface, or a convex core if it has no tree
+    a, b : numbers of the bodies; b is a surface, or a convex core if it has no tree or is -1
     T, S : (4, 4), m, place the two surfaces; S does not count for a core
     core : points (P, 3) in space, m, first and last row of the core (the last excluded), and the radius of its disc, m
     room : (ROOM, 3), scratch memory
@@ -429,7 +510,7 @@ def surface_distance(  # noqa: C901, PLR0912
     distance : m; below 0 where one is inside the other, 0 where they cross
     """
     _, first, last, disc = core
-    boxes, convex = trees.slim, trees.root[b] < 0
+    boxes, convex = trees.slim, b < 0 or trees.root[b] < 0
     count = last - first if convex else 3
     points, M, back = np.empty((3 + count, 3)), np.eye(3, 4), np.empty((3, 4))
     stack, bound, seen, turn = np.empty((WAITING, 2), np.int64), np.empty(WAITING), np.zeros((5, 3)), np.empty((4, 3))
@@ -442,7 +523,7 @@ def surface_distance(  # noqa: C901, PLR0912
     if within and far <= 0:  # only whether they overlap is asked
         return 0.0
     axis, close, start, other = np.zeros(3), np.empty((2, 3)), int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
-    stack[0, 0], stack[0, 1], bound[0], height, best = trees.root[a], trees.root[b], 0.0, 1, max(far, 2 * TOUCHING)
+    stack[0, 0], stack[0, 1], bound[0], height, best = trees.root[a], trees.root[max(b, 0)], 0.0, 1, max(far, 2 * TOUCHING)
     while height:
         height -= 1
         n, m, kept = stack[height, 0], stack[height, 1], height
@@ -554,17 +635,24 @@ def surface_above_plane(
 def depths_inside(trees: Trees, points: Reals, found: Reals) -> None:
     """How deep points lie in a surface's closed shells.
 
+    A point less deep than the deepest before, by its way from the point looked at last, is passed over.
+
     Parameters
     ----------
     trees : of the surface, and of a body that is convex
     points : (N, 3), m, in the body's frame
-    found : (N,), gets the depths, m; 0 for points outside
+    found : (N,), gets the depths, m; 0 for points outside, and for those passed over
     """
-    T, room, near = np.eye(4), np.empty((ROOM, 3)), np.empty((2, 3))
+    T, room, near, deepest, last = np.eye(4), np.empty((ROOM, 3)), np.empty((2, 3)), 0.0, -1
     for n in range(len(points)):
-        found[n] = 0.0
+        found[n], way = 0.0, 0.0
+        for r in range(3):
+            way += (points[n, r] - points[last, r]) ** 2
+        if last >= 0 and found[last] + np.sqrt(way) <= deepest:
+            continue
         if _around(trees, trees.root[0], _moved(T, points, n)):
-            found[n] = -surface_distance(trees, 0, T, 1, T, (points, n, n + 1, 0.0), room, near, np.inf)
+            found[n] = -surface_distance(trees, 0, T, -1, T, (points, n, n + 1, 0.0), room, near, np.inf)
+            deepest, last = max(deepest, found[n]), n
 
 
 @kernel
