@@ -38,7 +38,7 @@ HULL, CYLINDER, HALF_SPACE = 0, 1, 2
 WORLD = -1  # link of the bodies around the arm
 DEEPEST = 512  # boxes that wait at one time
 FREE, MEETS, UNDECIDED = 0, 1, 2
-SETTLED = 3e-9  # m; surfaces that are nearest within this of where their hulls are
+SETTLED = 5e-10  # m; surfaces that are nearest within this of where their hulls are
 NARROW = 1e-6  # m; a box in which bodies move by less is not halved
 BEYOND = (
     1e-3  # m; surfaces are measured so much farther than settles a box, as what is returned may be no more than that
@@ -108,7 +108,7 @@ def pair_distance(
         if convex:
             return above_plane(w, i, i_end, disc[a], j, room, near) - sizes, False
         normal = (w[j, 0], w[j, 1], w[j, 2])
-        return surface_above_plane(trees, T[link[a]], trees.root[a], normal, w[j + 1, 0], near), False
+        return surface_above_plane(trees, T[link[a]], a, normal, w[j + 1, 0], near), False
     if i_end - i <= 2 and j_end - j <= 2 and kind[a] == HULL and kind[b] == HULL:
         return lines_distance(w, i, i_end - 1, j, j_end - 1, near) - sizes, False
     least = np.inf if convex else max(far, 0.0) + sizes
@@ -161,7 +161,7 @@ def surfaces_distance(
         copy_values(ends[0], near[0])
         copy_values(ends[1], near[1])
         if best - least <= SETTLED:
-            return least, False
+            return best, False
     core = surface_distance(trees, a, T, b, S, (room, 0, 0, 0.0), room, near, best)
     return core, core == 0.0
 
@@ -323,17 +323,20 @@ def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integ
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
         start, best, at, inside = max(at, 0), np.inf, -1, False
-        for turn in range(count):
-            k = start + turn if start + turn < count else start + turn - count
+        for turn in range(0 if every else -count, count):  # at first only whether surfaces overlap
+            k = (start + turn) % count
             a, b = first[k], second[k]
-            if not every and (inside or _apart(middle, reach, a, b) >= best):
+            surface = root[a] >= 0 or root[b] >= 0
+            if not every and (
+                inside or (turn < 0 and not surface) or _apart(middle, reach, a, b) >= (0.0 if turn < 0 else best)
+            ):
                 continue
-            far = np.inf if every else 0.0 if joined[k] else max(best, 0.0)
+            far = np.inf if every else 0.0 if turn < 0 or joined[k] else max(best, 0.0)
             distance, overlap = pair_distance(layout, T, w, a, b, room, near, far)
-            inside = inside or overlap or ((root[a] >= 0 or root[b] >= 0) and distance < 0)
+            inside = inside or overlap or (surface and distance < 0)
             if every:
                 found[n, k] = distance
-            if distance < best and not (joined[k] and distance >= 0 and not overlap):
+            if distance < best and (turn >= 0 or inside) and not (joined[k] and distance >= 0 and not overlap):
                 best, at = distance, k
         smallest[n], pair[n], deep[n] = best, at, inside
 

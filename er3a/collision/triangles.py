@@ -22,12 +22,14 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import reduce
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 import scipy
+from scipy.spatial import ConvexHull, QhullError
 
 from er3a.by_value import ByValue
 from er3a.collision.convex import EXACT, ROOM, TOUCHING, cores_distance
@@ -36,7 +38,6 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 96 levels deep at most
-FIRST, TRIED = 14, 1000  # corners, with which the choice of few of a hull begins, and among about how many it goes on
 GROWN = 24  # corners of each hull at most, among which the nearest points of two are looked for
 EDGE = 1e-9  # m; gaps along directions across two edges count from here on, as parallel edges give none
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
@@ -55,8 +56,8 @@ class TriangleTree(ByValue):
     corner : (F, 3, 3), m
     shell : (F,), a number of the closed shell that a triangle belongs to, 0 for one that is not closed
     probe : (S, 3), m, a point of each shell that is not inside another one
-    hull : (H, 3), m, the corners of its hull, none if it is flat
-    beside : (H, 2), of each corner where its neighbours on the hull begin and end in ``edge`` (E,)
+    hull : (H, 3), m, the corners of its hull
+    fan : (H, 2), of each corner where its neighbours on the hull begin and end in ``edge`` (E,)
     """
 
     box: Reals
@@ -66,7 +67,7 @@ class TriangleTree(ByValue):
     shell: Integers
     probe: Reals
     hull: Reals
-    beside: Integers
+    fan: Integers
     edge: Integers
 
 
@@ -74,7 +75,7 @@ class Trees(NamedTuple):
     """The trees of the surfaces among B bodies, as kernels take them: as :class:`TriangleTree`, one after the other.
 
     ``root`` (B,): the first box of each body's tree, -1 for convex bodies; ``first``, ``last`` (B,): its probes;
-    ``start`` (B,): the first corner of its hull, -1 for none.
+    ``start`` (B,): the first corner of its hull.
     """
 
     root: Integers
@@ -85,7 +86,7 @@ class Trees(NamedTuple):
     shell: Integers
     probe: Reals
     hull: Reals
-    beside: Integers
+    fan: Integers
     edge: Integers
     first: Integers
     last: Integers
@@ -144,23 +145,26 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
         cut = begin + np.clip(np.add.reduceat(along < 0, begin), least, sizes - least)
         starts = np.stack([begin, cut], axis=1).ravel()
         ends = np.stack([cut, begin + sizes], axis=1).ravel()
-    probe, around = points[faces.ravel()[last]], np.empty(len(last), np.int64)
+    probe, around = points[faces.ravel()[last]], np.zeros(len(last), np.int64)
     trees = np.concatenate(boxes), np.concatenate(slims), np.concatenate(children)
     tree = TriangleTree(*trees, corner, shell, probe, *_hull(points[np.unique(faces)]))
-    shells_around(trees_of([tree]), probe, around)
+    if shell.any():
+        shells_around(trees_of([tree]), probe, around)
     return replace(tree, probe=probe[(around == 0) | (around == shell[last // 3])])
 
 
 def _hull(points: Reals) -> tuple[Reals, Integers, Integers]:
-    """The corners of a hull, and which are beside which, as a tree has them."""
+    """The corners of a hull, and how edges join them, as a tree has them; points in a plane are joggled for it."""
     try:
-        hull = scipy.spatial.ConvexHull(points)
-    except scipy.spatial.QhullError:  # flat
-        return points[:0], np.empty((0, 2), np.int64), np.empty(0, np.int64)
-    corners = np.searchsorted(hull.vertices, hull.simplices, sorter=(order := hull.vertices.argsort()))
-    pairs = np.unique(corners[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2), axis=0)
+        hull = ConvexHull(points)
+    except QhullError:
+        points = np.concatenate([points, points])  # four at least
+        hull = ConvexHull(points, qhull_options="QJ")
+    kept, order = np.unique(hull.simplices, return_inverse=True)
+    simplices = order.reshape(-1, 3)
+    pairs = np.unique(simplices[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2), axis=0)
     ends = np.cumsum(np.bincount(pairs[:, 0]))
-    return points[hull.vertices[order]], np.stack([np.append(0, ends[:-1]), ends], axis=1), pairs[:, 1]
+    return points[kept], np.stack([np.append(0, ends[:-1]), ends], axis=1), pairs[:, 1]
 
 
 def _bounds(corner: Reals, starts: Integers) -> Reals:
@@ -189,8 +193,7 @@ def _shells(faces: Integers, points: int) -> tuple[Integers, Integers]:
 def outer_corners(points: Reals, most: int = 64) -> Reals:
     """Few points whose hull holds all points.
 
-    Corners of the hull, one by one the one that is farthest outside of those before, moved away from their middle until
-    all others are inside.
+    Those that are farthest in directions all around, moved away from their middle until all others are inside.
 
     Parameters
     ----------
@@ -201,21 +204,14 @@ def outer_corners(points: Reals, most: int = 64) -> Reals:
     -------
     corners : (k, 3), m; of flat ones the eight of their box
     """
-    low, high = points.min(axis=0), points.max(axis=0)
-    box = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
     try:
-        corners = points[scipy.spatial.ConvexHull(points).vertices]
+        corners = points[ConvexHull(points).vertices]
         if len(corners) <= most:
             return np.asarray(corners)
-        first = np.unique((fibonacci_sphere(FIRST) @ corners.T).argmax(axis=1))
-        hull = scipy.spatial.ConvexHull(corners[first], incremental=True)
-        tried = corners[:: -(-len(corners) // TRIED)]
-        while len(hull.points) < most:
-            away = (hull.equations[:, :3] @ tried.T + hull.equations[:, 3:]).max(axis=0)
-            hull.add_points(tried[[away.argmax()]])
-    except scipy.spatial.QhullError:
-        return box
-    kept, faces = hull.points[hull.vertices], hull.equations
+        few = ConvexHull(corners[np.unique((fibonacci_sphere(most) @ corners.T).argmax(axis=1))])
+    except QhullError:
+        return np.array(list(product(*zip(points.min(axis=0), points.max(axis=0)))))
+    kept, faces = few.points, few.equations
     middle = kept.mean(axis=0)
     depth = -(faces[:, :3] @ middle + faces[:, 3])
     beyond = ((faces[:, :3] @ (corners - middle).T) / depth[:, None]).max()
@@ -235,27 +231,20 @@ def trees_of(trees: Sequence[TriangleTree | None]) -> Trees:
     trees : with roots (B,), -1 for convex bodies
     """
     own = {id(tree): tree for tree in trees if tree is not None}
-    kept = list(own.values())
-    keys = ("box", "corner", "probe", "hull", "edge")
-    begin = {key: np.cumsum([0, *(len(getattr(tree, key)) for tree in kept)]) for key in keys}
-    place = {key: k for k, key in enumerate(own)}
-    number = [place.get(id(tree), -1) for tree in trees]
+    kept = list(own.values()) or [tree_of(np.eye(3), np.array([[0, 1, 2]]))]  # kernels take no empty arrays
+    parts = {part.name: [getattr(tree, part.name) for tree in kept] for part in fields(TriangleTree)}
+    begin = {key: np.cumsum([0, *map(len, each)]) for key, each in parts.items()}
+    number = [list(own).index(id(tree)) if tree is not None else -1 for tree in trees]
     root, first, last, start = (
         np.array([begin[key][k + more] if k >= 0 else -1 for k in number], np.int64)
         for key, more in (("box", 0), ("probe", 0), ("probe", 1), ("hull", 0))
     )
-    start[[k >= 0 and not len(kept[k].hull) for k in number]] = -1
-    reals = {"box": (0, 2, 3), "slim": (0, 5, 3), "corner": (0, 3, 3), "probe": (0, 3), "hull": (0, 3)}
-    integers = {"shell": (0,), "edge": (0,), "beside": (0, 2), "child": (0, 2)}
-    parts = {key: [getattr(tree, key) for tree in kept] for key in (*reals, *integers)}
     for k, child in enumerate(parts["child"]):
         leaves = child + np.array([0, begin["corner"][k]])
         parts["child"][k] = np.where(child[:, :1] < 0, leaves, child + begin["box"][k])
-        parts["beside"][k] = parts["beside"][k] + begin["edge"][k]
+        parts["fan"][k] = parts["fan"][k] + begin["edge"][k]
         parts["edge"][k] = parts["edge"][k] + begin["hull"][k]
-    none = {key: np.empty(shape) for key, shape in reals.items()}
-    none |= {key: np.empty(shape, np.int64) for key, shape in integers.items()}
-    joined = {key: np.concatenate(each) if len(each) > 1 else [*each, none[key]][0] for key, each in parts.items()}
+    joined = {key: np.concatenate(each) if len(each) > 1 else each[0] for key, each in parts.items()}
     return Trees(root=root, first=first, last=last, start=start, **joined)
 
 
@@ -429,20 +418,23 @@ def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, M: Reals) -> 
 
 
 @inner_kernel
-def _farthest(trees: Trees, at: int, x: float, y: float, z: float) -> int:
-    """The corner of a hull that is farthest along a direction: from corner to corner uphill, from one of them on."""
-    hull, best = trees.hull, -np.inf
-    while True:
+def _farthest(trees: Trees, at: int, T: Reals, way: Vector, point: Reals) -> int:
+    """The corner of a hull, placed by T (4, 4), that is farthest along a direction, uphill from corner to corner from
+    one of them on; ``point`` (3,) gets it."""
+    hull, (x, y, z) = trees.hull, way
+    u = x * T[0, 0] + y * T[1, 0] + z * T[2, 0]
+    v = x * T[0, 1] + y * T[1, 1] + z * T[2, 1]
+    w = x * T[0, 2] + y * T[1, 2] + z * T[2, 2]
+    here, best = -1, u * hull[at, 0] + v * hull[at, 1] + w * hull[at, 2]
+    while here != at:
         here = at
-        if best == -np.inf:
-            best = x * hull[at, 0] + y * hull[at, 1] + z * hull[at, 2]
-        for edge in range(trees.beside[here, 0], trees.beside[here, 1]):
+        for edge in range(trees.fan[here, 0], trees.fan[here, 1]):
             n = trees.edge[edge]
-            value = x * hull[n, 0] + y * hull[n, 1] + z * hull[n, 2]
+            value = u * hull[n, 0] + v * hull[n, 1] + w * hull[n, 2]
             if value > best:
                 best, at = value, n
-        if at == here:
-            return at
+    point[0], point[1], point[2] = _moved(T, hull, at)
+    return at
 
 
 @inner_kernel
@@ -461,25 +453,27 @@ def hulls_distance(trees: Trees, a: int, T: Reals, b: int, S: Reals, room: Reals
 
     Returns
     -------
-    distance : m; 0 where they overlap; below 0 where it is not known, as of flat surfaces
+    distance : m; 0 where they overlap, or where ``GROWN`` corners don't show it
     """
-    i, j, points, half = trees.start[a], trees.start[b], np.empty((2 * GROWN, 3)), GROWN + int(0)  # noqa: RUF046, UP018
-    x, y, z, distance = near[1, 0] - near[0, 0], near[1, 1] - near[0, 1], near[1, 2] - near[0, 2], np.inf
-    for count in range(0 if min(i, j) < 0 else GROWN):
-        i = _farthest(trees, i, x * T[0, 0] + y * T[1, 0] + z * T[2, 0], x * T[0, 1] + y * T[1, 1] + z * T[2, 1], x * T[0, 2] + y * T[1, 2] + z * T[2, 2])
-        j = _farthest(trees, j, -x * S[0, 0] - y * S[1, 0] - z * S[2, 0], -x * S[0, 1] - y * S[1, 1] - z * S[2, 1], -x * S[0, 2] - y * S[1, 2] - z * S[2, 2])
-        points[count, 0], points[count, 1], points[count, 2] = _moved(T, trees.hull, i)
-        points[half + count, 0], points[half + count, 1], points[half + count, 2] = _moved(S, trees.hull, j)
-        size, gap = np.sqrt(x * x + y * y + z * z), 0.0
-        for r, along in enumerate((x, y, z)):
-            gap += along * (points[half + count, r] - points[count, r])
-        if count and (gap > far * size or distance * size - gap <= EXACT * size):
-            return max(gap / size, 0.0) if gap > far * size else distance
-        distance = cores_distance(points, (i * 0, i * 0 + count + 1, half, half + count + 1), 0.0, 0.0, room, near, np.inf)
-        if distance == 0:
-            return 0.0
+    i, j, points, zero, distance = trees.start[a], trees.start[b], np.empty((2 * GROWN, 3)), int(0), np.inf  # noqa: RUF046, UP018
+    for count in range(GROWN):
+        other = zero + GROWN + count
         x, y, z = near[1, 0] - near[0, 0], near[1, 1] - near[0, 1], near[1, 2] - near[0, 2]
-    return -1.0
+        i = _farthest(trees, i, T, (x, y, z), points[count])
+        j = _farthest(trees, j, S, (-x, -y, -z), points[other])
+        size, gap = np.sqrt(x * x + y * y + z * z), 0.0
+        for r in range(3):
+            gap += (near[1, r] - near[0, r]) * (points[other, r] - points[count, r])
+        if gap > far * size:
+            return float(gap / size)
+        if distance * size - gap <= EXACT * size:
+            return distance
+        distance = cores_distance(
+            points, (zero, zero + count + 1, zero + GROWN, other + 1), 0.0, 0.0, room, near, np.inf
+        )
+        if distance == 0:
+            break
+    return 0.0
 
 
 @inner_kernel
@@ -523,7 +517,13 @@ def surface_distance(  # noqa: C901, PLR0912
     if within and far <= 0:  # only whether they overlap is asked
         return 0.0
     axis, close, start, other = np.zeros(3), np.empty((2, 3)), int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
-    stack[0, 0], stack[0, 1], bound[0], height, best = trees.root[a], trees.root[max(b, 0)], 0.0, 1, max(far, 2 * TOUCHING)
+    stack[0, 0], stack[0, 1], bound[0], height, best = (
+        trees.root[a],
+        trees.root[max(b, 0)],
+        0.0,
+        1,
+        max(far, 2 * TOUCHING),
+    )
     while height:
         height -= 1
         n, m, kept = stack[height, 0], stack[height, 1], height
@@ -583,15 +583,13 @@ def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], points: Reals,
 
 
 @inner_kernel
-def surface_above_plane(
-    trees: Trees, T: Reals, root: int, normal: tuple[float, float, float], offset: float, near: Reals
-) -> float:
-    """How far a surface stays above a half-space.
+def surface_above_plane(trees: Trees, T: Reals, b: int, normal: Vector, offset: float, near: Reals) -> float:
+    """How far a surface stays above a half-space: as its hull does.
 
     Parameters
     ----------
     T : (4, 4), m, places the surface
-    root : first box of its tree
+    b : number of the body
     normal : unit vector out of the solid
     offset : m, how far along the normal the solid ends
     near : (2, 3), gets the lowest corner and its foot on the plane, m
@@ -601,31 +599,8 @@ def surface_above_plane(
     height : m, negative by the depth
     """
     x, y, z = normal
-    u = x * T[0, 0] + y * T[1, 0] + z * T[2, 0]
-    v = x * T[0, 1] + y * T[1, 1] + z * T[2, 1]
-    w = x * T[0, 2] + y * T[1, 2] + z * T[2, 2]
-    shift = x * T[0, 3] + y * T[1, 3] + z * T[2, 3] - offset
-    stack, best = np.empty(WAITING, np.int64), np.inf
-    stack[0], height = root, 1
-    while height:
-        height -= 1
-        n, box = stack[height], trees.slim[stack[height]]
-        low = u * box[0, 0] + v * box[0, 1] + w * box[0, 2]
-        for r in range(3):
-            low -= box[1, r] * abs(u * box[r + 2, 0] + v * box[r + 2, 1] + w * box[r + 2, 2])
-        if low >= best:
-            continue
-        if trees.child[n, 0] >= 0:
-            stack[height], stack[height + 1] = trees.child[n, 0], trees.child[n, 1]
-            height += 2
-            continue
-        for k in range(3):
-            corner = trees.corner[trees.child[n, 1], k]
-            value = u * corner[0] + v * corner[1] + w * corner[2]
-            if value < best:
-                best = value
-                near[0, 0], near[0, 1], near[0, 2] = _moved(T, trees.corner[trees.child[n, 1]], k)
-    above = best + shift
+    _farthest(trees, trees.start[b], T, (-x, -y, -z), near[0])
+    above = near[0, 0] * x + near[0, 1] * y + near[0, 2] * z - offset
     for r in range(3):
         near[1, r] = near[0, r] - above * normal[r]
     return float(above)
