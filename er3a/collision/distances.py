@@ -303,40 +303,40 @@ def some_distances(layout: Layout, q: Reals, pairs: Integers) -> tuple[Reals, Fl
 
 
 @kernel
-def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integers, deep: Flags) -> None:
-    """Distances of all pairs in many arm poses, or the smallest of each; of overlapping cores the smallest known depth.
+def measure(layout: Layout, q: Reals, smallest: Reals, pair: Integers, deep: Flags) -> None:
+    """The smallest distance in many arm poses; of overlapping cores the smallest known depth.
 
-    Without columns of ``found`` pairs that can't be the nearest are left out. What was nearest in the pose before is
-    measured first, as it mostly is again.
+    At first only whether surfaces overlap. Then pairs that can't be the nearest are left out. What was nearest in the
+    pose before is measured first, as it mostly is again.
 
     Parameters
     ----------
     q : (N, n), rad or m
-    found : (N, K), gets all distances, m; or (0, 0)
     smallest, pair : (N,), get the smallest distance, m, and its number; joined pairs count only where they overlap
     deep : (N,), gets whether cores overlapped, or a surface and another body, whose depth is not known then
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     T, w, middle = unplaced(layout)
-    reach, first, second, joined = layout.reach, layout.first, layout.second, layout.joined
-    every, root, count, at = found.shape[1] > 0, layout.trees.root, len(first), -1
+    reach, first, second, root, count, at = (
+        layout.reach,
+        layout.first,
+        layout.second,
+        layout.trees.root,
+        len(layout.first),
+        -1,
+    )
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
         start, best, at, inside = max(at, 0), np.inf, -1, False
-        for turn in range(0 if every else -count, count):  # at first only whether surfaces overlap
+        for turn in range(-count, count):
             k = (start + turn) % count
             a, b = first[k], second[k]
-            surface = root[a] >= 0 or root[b] >= 0
-            if not every and (
-                inside or (turn < 0 and not surface) or _apart(middle, reach, a, b) >= (0.0 if turn < 0 else best)
-            ):
+            surface, far = root[a] >= 0 or root[b] >= 0, 0.0 if turn < 0 else best
+            if inside or (turn < 0 and not surface) or _apart(middle, reach, a, b) >= far:
                 continue
-            far = np.inf if every else 0.0 if turn < 0 or joined[k] else max(best, 0.0)
-            distance, overlap = pair_distance(layout, T, w, a, b, room, near, far)
-            inside = inside or overlap or (surface and distance < 0)
-            if every:
-                found[n, k] = distance
-            if distance < best and (turn >= 0 or inside) and not (joined[k] and distance >= 0 and not overlap):
+            distance, overlap = pair_distance(layout, T, w, a, b, room, near, 0.0 if layout.joined[k] else far)
+            inside = overlap or (surface and distance < 0)
+            if distance < best and (inside or turn >= 0) and not (layout.joined[k] and distance >= 0 and not overlap):
                 best, at = distance, k
         smallest[n], pair[n], deep[n] = best, at, inside
 

@@ -39,7 +39,7 @@ from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 96 levels deep at most
 GROWN = 24  # corners of each hull at most, among which the nearest points of two are looked for
-EDGE = 1e-9  # m; gaps along directions across two edges count from here on, as parallel edges give none
+FIRST, TRIED = 14, 2000  # corners of a hull with which the choice of few begins; and among how many it goes on
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
 
@@ -193,7 +193,8 @@ def _shells(faces: Integers, points: int) -> tuple[Integers, Integers]:
 def outer_corners(points: Reals, most: int = 64) -> Reals:
     """Few points whose hull holds all points.
 
-    Those that are farthest in directions all around, moved away from their middle until all others are inside.
+    Corners of the hull, one by one the one that is farthest outside of those before, moved away from their middle until
+    all others are inside.
 
     Parameters
     ----------
@@ -208,10 +209,14 @@ def outer_corners(points: Reals, most: int = 64) -> Reals:
         corners = points[ConvexHull(points).vertices]
         if len(corners) <= most:
             return np.asarray(corners)
-        few = ConvexHull(corners[np.unique((fibonacci_sphere(most) @ corners.T).argmax(axis=1))])
+        hull = ConvexHull(corners[np.unique((fibonacci_sphere(FIRST) @ corners.T).argmax(axis=1))], incremental=True)
+        tried = corners[:: -(-len(corners) // TRIED)]
+        while len(hull.points) < most:
+            away = (hull.equations[:, :3] @ tried.T + hull.equations[:, 3:]).max(axis=0)
+            hull.add_points(tried[[away.argmax()]])
     except QhullError:
         return np.array(list(product(*zip(points.min(axis=0), points.max(axis=0)))))
-    kept, faces = few.points, few.equations
+    kept, faces = hull.points[hull.vertices], hull.equations
     middle = kept.mean(axis=0)
     depth = -(faces[:, :3] @ middle + faces[:, 3])
     beyond = ((faces[:, :3] @ (corners - middle).T) / depth[:, None]).max()
@@ -304,18 +309,7 @@ def _boxes_apart(boxes: Reals, n: int, other: Reals, turn: Reals, limit: float) 
             gap -= abs(turn[r, c]) * boxes[n, 1, r]
         gap += abs(along)
         least, beyond = max(least, gap), beyond + max(gap, 0.0) ** 2
-    if least > 0:
-        return max(apart, beyond)
-    for r in range(3):
-        i, j = (r + 1) % 3, (r + 2) % 3
-        for c in range(3):
-            k, o = (c + 1) % 3, (c + 2) % 3
-            gap = abs(turn[3, j] * turn[i, c] - turn[3, i] * turn[j, c])
-            gap -= boxes[n, 1, i] * abs(turn[j, c]) + boxes[n, 1, j] * abs(turn[i, c])
-            gap -= other[1, k] * abs(turn[r, o]) + other[1, o] * abs(turn[r, k])
-            if gap > EDGE:
-                return float(gap * gap)
-    return least
+    return max(apart, beyond) if least > 0 else least
 
 
 @inlined_kernel
