@@ -149,7 +149,7 @@ def surfaces_distance(
     if least > far:
         return least, False
     best = far
-    if least > 0 and far > 0:  # the points of the surfaces beside the hulls' nearest ones
+    if least > 0 and far > 0:  # the surfaces' own points nearest to the hulls' nearest ones
         for k, body, frame in ((0, a, T), (1, b, S)):
             surface_distance(trees, body, frame, -1, frame, (near, k, k + 1, 0.0), room, close, np.inf)
             for r in range(3):

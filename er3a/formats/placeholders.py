@@ -9,19 +9,17 @@ coordinates; or moments of inertia about the links' origins.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import scipy
 
-from er3a.collision.shapes import arm_shapes
 from er3a.dynamics.arm_model import LinkShape, link_shapes
 from er3a.dynamics.plausibility import mass_findings
 from er3a.finding import is_one
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Masses
-from er3a.robots.robot import LinkMesh, Robot, Source
+from er3a.robots.robot import Robot, Source
 
 ROUNDED_RAD = 2e-3  # half a turn written as 3.14
 SEVERAL = 3  # joints or links, that no maker's arm has alike
@@ -87,13 +85,13 @@ def _no_masses(robot: Robot) -> str:
     moments = [np.linalg.eigvalsh(each.body.inertia_matrix) for each in links]
     if len(moments) >= SEVERAL and np.allclose(moments, moments[0][0]):
         return f"all links have the moment of inertia {moments[0][0]:g} kg m2 about each axis"
-    parts = [(visual.link, visual) for visual in robot.visuals]
-    parts += link_shapes(robot).items() if links and arm_shapes(robot).given else []
-    away = {
-        each.link: _outside([part for link, part in parts if link == each.link], np.array(each.body.centre))
+    shapes = link_shapes(robot) if links else {}
+    far = {
+        each.link: away
         for each in links
+        if (away := _outside(robot, shapes.get(each.link), each.link, each.body.centre)) > OUTSIDE_M
     }
-    if far := {link: distance for link, distance in away.items() if distance > OUTSIDE_M}:
+    if far:
         link = max(far, key=far.__getitem__)
         more = f" and {len(far) - 1} more" if len(far) > 1 else ""
         return f"the centre of mass of link {link}{more} is {1000 * far[link]:.0f} mm outside of the link"
@@ -103,9 +101,11 @@ def _no_masses(robot: Robot) -> str:
     return ""
 
 
-def _outside(drawn: Sequence[LinkMesh | LinkShape], centre: Reals) -> float:
+def _outside(robot: Robot, shape: LinkShape | None, link: int, centre: tuple[float, ...]) -> float:
     """How far (m) a centre (3,) is outside of the hull of what a link is drawn with; -inf where nothing is."""
-    if not drawn:
+    parts = [visual.points for visual in robot.visuals if visual.link == link]
+    parts += [shape.points] if shape and not shape.guessed else []
+    if not parts:
         return -math.inf
-    hull = scipy.spatial.ConvexHull(np.concatenate([part.points for part in drawn]), qhull_options="QJ")
+    hull = scipy.spatial.ConvexHull(np.concatenate(parts), qhull_options="QJ")
     return float((hull.equations @ np.append(centre, 1.0)).max())
