@@ -4,9 +4,12 @@ A tree cuts the box of the triangles' middles in half along its longest side, at
 until each box holds one triangle. A box lies along the principal axes of what it holds, and so is as thin as that:
 housings that turn in each other are near over a wide area. Two surfaces are measured by descending both trees at once,
 the nearer boxes first, or those that are deeper in each other; boxes that are farther away than what was found are left
-out. The distance of two boxes is bounded from below by the box of one that holds the other, in either's axes; boxes
-that overlap so are tried along the directions across two of their edges [1]_. Two triangles are measured as convex
-cores, and so is a triangle with a convex body.
+out. The distance of two boxes is bounded from below by the box of one that holds the other, in either's axes [1]_. Two
+triangles are measured as convex cores, and so is a triangle with a convex body.
+
+The hulls of two surfaces are measured before, as facing rings are nearest all around and leave boxes little to rule
+out. Where the hulls are nearest, on either, lies mostly a point of the surface: then theirs is the distance. The corner
+of a hull that is farthest along a direction is found uphill, from corner to corner along its edges [2]_.
 
 A surface may consist of many shells. A point is inside if a ray from it crosses one of the closed shells an odd number
 of times. What does not cross a surface, but has a point of one of its shells inside, is inside as a whole. Of a shell
@@ -17,6 +20,8 @@ References
 ----------
 .. [1] S. Gottschalk, M. C. Lin, D. Manocha, "OBBTree: a hierarchical structure for rapid interference detection",
    SIGGRAPH (1996).
+.. [2] S. Cameron, "Enhancing GJK: computing minimum and penetration distances between convex polyhedra", IEEE Int.
+   Conf. Robotics and Automation (1997).
 """
 
 from __future__ import annotations
