@@ -315,16 +315,10 @@ def measure(layout: Layout, q: Reals, smallest: Reals, pair: Integers, deep: Fla
     smallest, pair : (N,), get the smallest distance, m, and its number; joined pairs count only where they overlap
     deep : (N,), gets whether cores overlapped, or a surface and another body, whose depth is not known then
     """
-    room, near = np.empty((ROOM, 3)), np.empty((2, 3))
+    room, near = np.empty((ROOM, 3)), np.zeros((2, 3))
     T, w, middle = unplaced(layout)
-    reach, first, second, root, count, at = (
-        layout.reach,
-        layout.first,
-        layout.second,
-        layout.trees.root,
-        len(layout.first),
-        -1,
-    )
+    reach, first, second = layout.reach, layout.first, layout.second
+    root, count, at = layout.trees.root, len(first), -1
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
         start, best, at, inside = max(at, 0), np.inf, -1, False
@@ -353,7 +347,7 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:  # noqa: C901
     q : (N, n), rad or m
     found : (N, K) bool, gets which overlap; with one column, whether any does
     """
-    room, near = np.empty((ROOM, 3)), np.empty((2, 3))
+    room, near = np.empty((ROOM, 3)), np.zeros((2, 3))
     T, w, middle = unplaced(layout)
     reach, first, second, link = layout.reach, layout.first, layout.second, layout.link
     one, axes, hit, count = found.shape[1] == 1, np.zeros((len(first), 3)), 0, len(first)
@@ -473,7 +467,7 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
     state, looked : FREE; MEETS, if an arm in which something overlaps was found; or UNDECIDED, for more than ``most``
         arms or such a stretch. And the number of joint vectors examined
     """
-    room, near = np.empty((ROOM, 3)), np.empty((2, 3))
+    room, near = np.empty((ROOM, 3)), np.zeros((2, 3))
     placed = unplaced(layout)
     stack = np.empty((DEEPEST, 2))
     stack[0, 0], stack[0, 1] = 0.0, 1.0
@@ -526,7 +520,7 @@ def search_boxes(
     looked : how many boxes were examined
     smallest : m, of FREE a lower bound of the distance (or depth)
     """
-    room, near = np.empty((ROOM, 3)), np.empty((2, 3))
+    room, near = np.empty((ROOM, 3)), np.zeros((2, 3))
     n = box.shape[1]
     T, w, middle = unplaced(layout)
     overlapping, goal = aim

@@ -516,13 +516,8 @@ def surface_distance(  # noqa: C901, PLR0912
     if within and far <= 0:  # only whether they overlap is asked
         return 0.0
     axis, close, start, other = np.zeros(3), np.empty((2, 3)), int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
-    stack[0, 0], stack[0, 1], bound[0], height, best = (
-        trees.root[a],
-        trees.root[max(b, 0)],
-        0.0,
-        1,
-        max(far, 2 * TOUCHING),
-    )
+    stack[0, 0], stack[0, 1] = trees.root[a], trees.root[max(b, 0)]
+    bound[0], height, best = 0.0, 1, max(far, 2 * TOUCHING)
     while height:
         height -= 1
         n, m, kept = stack[height, 0], stack[height, 1], height
