@@ -228,11 +228,14 @@ def test_a_home_that_collides_hides_no_path_that_does(ends_deg, status, collidin
     assert (verdict.finding.nearest.name, [each.name for each in verdict.finding.colliding]) == ("free", colliding)
 
 
-@pytest.mark.parametrize(("lower_deg", "home_from"), [(-4, "chosen"), (-60, "zero")])
-def test_joints_at_0_near_a_limit_are_no_home(lower_deg, home_from, random):
+@pytest.mark.parametrize(
+    ("lower_deg", "wrist", "home_from"), [(-4, 0.5, "chosen"), (-60, 0.0, "chosen"), (-60, 0.5, "zero")]
+)
+def test_joints_at_0_near_a_limit_or_a_singular_pose_are_no_home(lower_deg, wrist, home_from, random):
     robot = load_robot(NAME)
     lower = np.where(np.arange(robot.joints) == 1, np.radians(lower_deg), robot.lower)
-    bodies = Bodies(robot.replace(lower=lower), None)
+    offset = robot.offset + wrist * (np.arange(robot.joints) == 4)
+    bodies = Bodies(robot.replace(lower=lower, offset=offset), None)
     free = random.uniform(lower, robot.upper, (200, robot.joints))
     found, home = _home(bodies, None, free[bodies.free(free)])
     assert found == home_from
