@@ -31,7 +31,7 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
-from er3a.by_value import Displayed
+from er3a.by_value import Displayed, by_identity, frozen
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
@@ -49,7 +49,7 @@ Joints = Callable[[Reals], Reals]
 RateBounds = Callable[[Reals, Reals], tuple[Reals, Reals]]
 
 
-@dataclass(frozen=True)
+@frozen
 class Touch:
     """Two bodies that overlap.
 
@@ -65,7 +65,7 @@ class Touch:
     at: float
 
 
-@dataclass(frozen=True)
+@frozen
 class Contact:
     """A stretch of overlap.
 
@@ -88,7 +88,7 @@ class Contact:
         return tuple(touch.pair for touch in self.touches)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ClearanceAlong:
     """Clearance along a motion.
 

@@ -17,12 +17,11 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from scipy.cluster.hierarchy import DisjointSet
 
+from er3a.by_value import by_identity, frozen
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import FREE, free_between
 from er3a.kinematics.batch import inverse_batch
@@ -37,7 +36,7 @@ DEPTH = 1e-3  # m; a move in which the arm may overlap by less than this, unprov
 LOOKS = 300  # arms looked at to prove one move
 
 
-@dataclass(frozen=True)
+@frozen
 class Share:
     """A share of random joint vectors, with its 95 % interval."""
 
@@ -58,7 +57,7 @@ class Share:
         return max(0.0, middle - half), min(1.0, middle + half)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class JointSpace:
     """Counts of random joint vectors.
 
@@ -90,7 +89,7 @@ class JointSpace:
         return int(self.overlaps[:, pairs].any(axis=1).sum())
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class ClearPlaces:
     """Cells of space that the tool point was brought to.
 

@@ -24,13 +24,14 @@ as if they weren't allowed, and if they would be checked then, no verdict passes
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import lru_cache
 from itertools import combinations, product
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.collision.distances import FREE, MEETS, Layout, measure, search_boxes, some_distances, which_overlap
 from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED, link_label
 from er3a.collision.scene import Box, Scene
@@ -55,7 +56,7 @@ SHORTEST = 1e-6  # m
 BodyPair = tuple[Body, Body]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class MatrixRow:
     """What holds of two links, or of a link and what is carried, over all of their bodies.
 
@@ -80,7 +81,7 @@ class MatrixRow:
     hides: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class CollisionMatrix:
     """The allowed collision matrix: a row for each pair of links, and the pairs of bodies that are checked.
 
@@ -320,7 +321,7 @@ def _overlap(robot: Robot, pairs: Sequence[BodyPair]) -> Flags:
 INSIDE = 1e-6  # m
 
 
-@dataclass(frozen=True)
+@frozen
 class BaseContact:
     """A solid that a body of the base touches, by a depth (m; of hulls in solids with faces at least that).
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, frozen, shortly
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Integers, Reals
@@ -15,7 +13,7 @@ from er3a.robots.robot import PairRule
 UNIT_LENGTH = 1e-6  # by which a normal's length may differ from 1
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Box(ByValue):
     """A box about its own middle.
 
@@ -37,7 +35,7 @@ class Box(ByValue):
         return f"{_place(self.T)}; size {shortly(tuple((1000 * np.asarray(self.size)).tolist()))}"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Cylinder(ByValue):
     """A cylinder about its own middle, along its z axis.
 
@@ -60,7 +58,7 @@ class Cylinder(ByValue):
         return f"{_place(self.T)}; radius {1000 * self.radius:.6g}, length {1000 * self.length:.6g}"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Sphere(ByValue):
     """A ball.
 
@@ -82,7 +80,7 @@ class Sphere(ByValue):
         return f"{_place(self.T)}; radius {1000 * self.radius:.6g}"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Plane(ByValue):
     """A half-space: all points p with normal . p <= offset are solid.
 
@@ -105,7 +103,7 @@ class Plane(ByValue):
         return f"normal {shortly(tuple(np.asarray(self.normal).tolist()))}; offset {1000 * self.offset:.6g}"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Mesh(ByValue):
     """A surface of triangles; what is inside a closed one is solid.
 
@@ -131,7 +129,7 @@ class Mesh(ByValue):
 Solid = Box | Cylinder | Sphere | Plane | Mesh
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class Scene(ByValue, Displayed):
     """What an arm may not touch; no two solids have the same name.
 

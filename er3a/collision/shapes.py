@@ -19,13 +19,14 @@ estimate of how thick small industrial arms are. The column below axis 2 counts 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import assert_never
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity, frozen
 from er3a.collision.convex import cylinder_points, distances_from_hull
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout
 from er3a.collision.meshes import MOST_CORNERS, hull_corners, is_convex
@@ -50,7 +51,7 @@ PARALLEL = 1e-6  # cosine short of 1
 UNSHAPED = 0.02  # m, of the way from the flange to a tool's point: adapters are thin, and tools reach a little less far
 
 
-@dataclass(frozen=True)
+@frozen
 class ArmShapes:
     """All shapes of an arm's links, and what they rest on.
 
@@ -340,7 +341,7 @@ BALL = 200  # corners by which a ball is drawn
 CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Body:
     """A convex body, or a surface of triangles.
 

@@ -27,7 +27,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import reduce
 from itertools import product
 from typing import NamedTuple
@@ -36,7 +36,7 @@ import numpy as np
 import scipy
 from scipy.spatial import ConvexHull, QhullError
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, frozen
 from er3a.collision.convex import EXACT, ROOM, TOUCHING, cores_distance
 from er3a.geometry.vectors import Vector, fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
@@ -48,7 +48,7 @@ FIRST, TRIED = 14, 2000  # corners of a hull with which the choice of few begins
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class TriangleTree(ByValue):
     """A surface of F triangles with its tree of M boxes, in the frame of its link.
 

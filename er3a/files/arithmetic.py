@@ -7,7 +7,9 @@ import math
 import re
 import unicodedata
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
+
+from er3a.by_value import frozen
 
 LONGEST = 200  # characters of an expression
 TWO_VALUES = "two values"
@@ -49,7 +51,7 @@ _SIGNS = str.maketrans("−–—﹣∗⋅·×∕÷º˚∘◦⍺", "----****//°
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
 
 
-@dataclass(frozen=True)
+@frozen
 class CellAmount:
     """A number, the unit that it is said to be in ("" if none), and how often each variable is added to it."""
 

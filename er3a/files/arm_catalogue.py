@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.files.kept_files import ROOT
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
@@ -25,7 +25,7 @@ OF_ROWS = "a_mm", "alpha_deg", "d_mm", "direction", "offset_deg"
 OF_JOINTS = "lower", "upper", "speeds"
 
 
-@dataclass(frozen=True)
+@frozen
 class Publication:
     """A public source: ``title`` as it is cited, and what its numbers are worth (``grade``)."""
 
@@ -33,7 +33,7 @@ class Publication:
     grade: Grade
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class KnownArm:
     """An arm of the catalogue.
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+
+from er3a.by_value import frozen
 
 LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
-@dataclass(frozen=True)
+@frozen
 class CodeGroup:
     """A pair of brackets: where they are, what is in them and what is written before them."""
 

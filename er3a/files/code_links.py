@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
+from er3a.by_value import frozen
 from er3a.files.arithmetic import words_of
 from er3a.files.code_brackets import CodeGroup, parts
 from er3a.files.code_lists import Lists
@@ -135,7 +135,7 @@ def _constants(cells: Cells) -> Words:
     return [cell for name, cell in cells.items() if quantities_of([name]) not in ([], ["theta"], ["type"])]
 
 
-@dataclass(frozen=True)
+@frozen
 class _Link:
     name: str
     place: int

@@ -8,10 +8,10 @@ import io
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from er3a.by_value import frozen
 from er3a.errors import InputError, given_bytes
 from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.formats.mesh_file import TOO_LARGE, read_text, text_of
@@ -41,7 +41,7 @@ class Written(float):
         return number
 
 
-@dataclass(frozen=True)
+@frozen
 class CsvColumn:
     """One column of a CSV table.
 
@@ -294,7 +294,7 @@ def _allowed(column: CsvColumn) -> str:
     return f" one of: {', '.join(column.choices)}" if column.choices else ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Mistaken:
     """A unit that values were written in by mistake.
 

@@ -12,7 +12,6 @@ Rotation vectors (axis times angle, in rad) are used by OpenCV and by the pendan
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pydantic import Field, model_validator
 
+from er3a.by_value import by_identity
 from er3a.errors import InputError
 from er3a.files.csv_file import METRES, CsvColumn, CsvRows, read_csv, read_header, refuse_unit
 from er3a.files.orientations import FORMS, POSITION, form_in, poses_of
@@ -124,7 +124,7 @@ class ImageEntry(StrictModel):
     pixel_standard_deviation: Annotated[float, Field(gt=0, le=100)] = 0.3
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SeenImages:
     """Image files that show the board, as the table names them, what was found in each, and those without it."""
 

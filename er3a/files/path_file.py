@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -27,6 +26,7 @@ import numpy as np
 import scipy
 from pydantic import BeforeValidator, Field, model_validator
 
+from er3a.by_value import by_identity
 from er3a.errors import InputError
 from er3a.files.csv_file import (
     CHECKED_COLUMN,
@@ -71,7 +71,7 @@ TRAJECTORIES = (".yaml", ".yml", ".json")  # endings of joint trajectories of RO
 UR_JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PathTable:
     """The points of a table.
 

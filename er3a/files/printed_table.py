@@ -12,11 +12,12 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import NoReturn
 
+from er3a.by_value import frozen
 from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import CALLED, TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
 from er3a.files.code_lists import Lists
@@ -115,7 +116,7 @@ _CALL = re.compile(r"(?:\w+\.)*(\w+)\([\w.,\[\] ]*[^\W\d][\w.,\[\] ]*\)\s*")
 """A call of a function of names, whose value nobody knows."""
 
 
-@dataclass(frozen=True)
+@frozen
 class PrintedTable:
     """Lines as a file's lines, under er3a's headings; what was read into them, in words; columns of which neither the
     heading nor cells say the unit."""

@@ -6,12 +6,13 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from er3a.by_value import frozen
 from er3a.errors import InputError, InputWarning
 from er3a.files.csv_file import (
     METRES,
@@ -65,7 +66,7 @@ _POSE = tuple(f"q{joint}_deg" for joint in range(1, len(ZERO_POSE) + 1))
 _FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MAX_JOINTS + 1))
 
 
-@dataclass(frozen=True)
+@frozen
 class Format:
     """The table of a kind.
 

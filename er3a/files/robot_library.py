@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from er3a.by_value import frozen
 from er3a.comparison.compare import Uncompared, beside_the_table
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals
 from er3a.errors import InputError, InputWarning
@@ -45,7 +46,7 @@ ROBOTS = ROOT / "data" / "robots"
 MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
-@dataclass(frozen=True)
+@frozen
 class ReadArm:
     """``printed``: whether the table was given, not derived; ``notes``: assumptions; ``beside``: what the file gives
     that a comparison doesn't look at; ``units``: of columns, as their headings say them."""

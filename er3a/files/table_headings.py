@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import lru_cache
 
+from er3a.by_value import frozen
 from er3a.files.arithmetic import UNITS, plain, words_of
 
 _JOINT = words_of(
@@ -36,7 +36,7 @@ _UNIT = re.compile(r"(?:[(\[/,]|(?<=[a-zα-ω])_(?=(?:mm|cm|m|in|deg|rad)$))([^(
 _BEFORE = re.compile(r"[ijn](?:-1|_?m1)")
 
 
-@dataclass(frozen=True)
+@frozen
 class Heading:
     """``quantity``: joint, theta, d, a, alpha, offset, beta or type; ``unit``: "" where none is printed; ``before``:
     whether it belongs to the link before the joint, as in Craig's tables; ``sign``: the letter that was printed for a

@@ -15,14 +15,14 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, frozen, shortly
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.meshes import simplified
 from er3a.collision.pairs import link_label
@@ -49,7 +49,7 @@ SHOWN_MM = 1e-4  # that a point of the flange moves by; no controller shows less
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class UrdfImport(ByValue, Displayed):
     """A robot derived from a URDF.
 

@@ -28,13 +28,14 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import scipy
 
+from er3a.by_value import by_identity
 from er3a.collision.convex import cylinder_points
 from er3a.collision.meshes import MOST_CORNERS, hull_corners, hull_faces, is_convex
 from er3a.collision.shapes import CORNERS
@@ -68,7 +69,7 @@ MAX_TURNED = 20 * math.pi
 FAR_APART_M, MAX_APART_M = 5.0, 100.0
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Mimic:
     """A joint that follows another: ``multiplier`` times it plus ``offset`` (rad or m)."""
 
@@ -77,7 +78,7 @@ class Mimic:
     offset: float
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class UrdfJoint:
     """One joint: its place in its parent link's frame, and how it moves.
 
@@ -109,7 +110,7 @@ class UrdfJoint:
         return self.moves and self.mimic is None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class UrdfChain:
     """The joints from base to tip, all joints of the file by name, and what was noted on the way."""
 
@@ -778,7 +779,7 @@ SAME_M = 1e-6  # to which a sphere's centre and radius are those of a cylinder's
 Shape = Envelope | ConvexPiece | LinkMesh
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class CylinderOfLink:
     """A cylinder of a link: as the prism around it, and as the capsule that it makes with a ball about each end."""
 
