@@ -55,7 +55,7 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
     evidence = read_stage(tmp_path / name / "validation", STAGES["validation"]).results.summary.evidence
     stated = [each for each in evidence.entries if each.value is not None]
     for entry in stated:
-        link = re.escape(f'href="{name}/validation.html#entry-{entry.entry}"')
+        link = re.escape(f'href="{name}/validation.html#cell-{entry.entry}"')
         status, shown = re.search(rf'<td class="(\w+)" title="[^"]*"><a {link}[^>]*>(.*?)</a></td>', page).groups()
         assert status == entry.status, entry
         if status != "contradicted":

@@ -643,16 +643,14 @@ explainTerms(JSON.parse(document.getElementById("terms").textContent));
 // A sheet of paper can't be unfolded.
 addEventListener("beforeprint", () => document.querySelectorAll("details.section").forEach((details) => (details.open = true)));
 
-// On a phone each row of a table of cards is one: its cells stand below one another, each after its column's name. A row
-// that an address leads to has these names too.
+// On a phone each row of a table of cards is one: its cells stand below one another, each after its column's name.
 function nameCells(table) {
   const names = [...table.tHead.rows[0].cells].map((header) => (header.innerText || header.textContent).replace(/\s+/g, " ").trim());
   for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, column) => (cell.dataset.column = names[column]));
-  table.classList.toggle("named", table.classList.contains("cards"));
 }
 
 for (const table of document.querySelectorAll("table")) {
-  if (table.tHead && (table.classList.contains("cards") || table.querySelector("tbody tr[id]"))) nameCells(table);
+  if (table.tHead && table.classList.contains("cards")) nameCells(table);
   makeSortable(table);
   if (table.matches(".matrix table, .tile table")) continue;
   const tools = document.createElement("p");
@@ -747,14 +745,13 @@ returnToPlace();
 // together is marked in the table; the evidence of an entry stands below.
 const entryOf = (hash) => hash?.slice(1).replace(/^(cell|entry)-/, "") || null;
 const entryLinks = document.querySelectorAll(".runs a[href^='#cell-'], .grid .entries a");
-const evidence = Object.assign(document.createElement("p"), { className: "evidence", role: "status" });
-if (entryLinks.length) document.querySelector(".side > :last-child").append(evidence);
+const evidence = Object.assign(document.createElement("b"), { className: "evidence", role: "status" });
+document.querySelector(".grid .key")?.prepend(evidence);
 const next = document.querySelector(".hero:has(.look) .fix"), first = next && [next.querySelector("span").lastChild.data, next.querySelector("a").hash];
 function showEntry(entry = entryOf(location.hash)) {
   for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
   const look = document.querySelector(".look.shown"); // of a joint that is to be jogged: the one thing to do says it
-  const cells = [...(document.getElementById(`entry-${entry}`)?.cells ?? [])].filter((cell) => textOf(cell) !== "–").slice(0, look ? -1 : undefined);
-  evidence.textContent = cells.map((cell, k) => (k < 3 ? "" : `${cell.dataset.column}${WORDS.colon}`) + textOf(cell)).join(" · ");
+  evidence.textContent = document.querySelector(`#cell-${entry} > a`)?.dataset.said ?? "";
   for (const link of document.querySelectorAll(".grid .key > a")) link.hash = document.getElementById(`entry-${entry}`)?.id ?? "marks";
   if (next) [next.querySelector("span").lastChild.data, next.querySelector("a").hash] = look ? [` ${look.dataset.next}`, `#cell-${entry}`] : first;
   for (const link of entryLinks) link.toggleAttribute("data-shown", [entryOf(link.hash), link.dataset.asked].includes(entry));
@@ -765,3 +762,11 @@ for (const link of entryLinks) {
 }
 addEventListener("hashchange", () => showEntry());
 showEntry();
+// The jog is played when it is asked for, and again by the same button.
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+const jog = () => still.matches || document.querySelectorAll(".look.shown animate").forEach((part) => part.beginElement());
+document.querySelector(".hero .fix a")?.addEventListener("click", () => {
+  document.querySelectorAll(".hero .lines").forEach((lines) => (lines.open = true));
+  setTimeout(jog, 100);
+});
+addEventListener("hashchange", jog);
