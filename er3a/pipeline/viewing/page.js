@@ -762,11 +762,9 @@ for (const link of entryLinks) {
 }
 addEventListener("hashchange", () => showEntry());
 showEntry();
-// The jog is played when it is asked for, and again by the same button.
-const still = matchMedia("(prefers-reduced-motion: reduce)");
-const jog = () => still.matches || document.querySelectorAll(".look.shown animate").forEach((part) => part.beginElement());
-document.querySelector(".hero .fix a")?.addEventListener("click", () => {
-  document.querySelectorAll(".hero .lines").forEach((lines) => (lines.open = true));
-  setTimeout(jog, 100);
-});
+// The one thing to do opens lines to copy, and plays the jog again.
+const asking = document.querySelector(".hero .fix a");
+const jog = () => matchMedia("(prefers-reduced-motion: reduce)").matches || document.querySelectorAll(".look.shown animate").forEach((part) => part.beginElement());
+asking?.addEventListener("click", () => setTimeout(jog, 100));
+for (const lines of document.querySelectorAll(".hero .lines")) asking?.addEventListener("click", () => (lines.open = true));
 addEventListener("hashchange", jog);

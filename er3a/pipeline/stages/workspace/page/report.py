@@ -10,7 +10,7 @@ from markupsafe import Markup
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import FORMATS, joined, say
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
 from er3a.pipeline.results import Stored
@@ -101,8 +101,6 @@ def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     note, limits = if_normal(void, with_unit(workspace_figures.litres(void), "L")), void.cause.params.get("limits", ())
     if [each.joints for each in limits] == [(1,), (1,)] and limits[0].limit == -limits[1].limit:
         note = tr("behind the arm: J1 stops at ±{deg:g}°", deg=abs(limits[0].limit))
-    elif not void.holds_shoulder:
-        note = joined([note, *map(FORMATS["limit"], limits)], ", ")
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
 
 
