@@ -643,14 +643,15 @@ explainTerms(JSON.parse(document.getElementById("terms").textContent));
 // A sheet of paper can't be unfolded.
 addEventListener("beforeprint", () => document.querySelectorAll("details.section").forEach((details) => (details.open = true)));
 
-// On a phone each row of a table of cards is one: its cells stand below one another, each after its column's name.
+// On a phone each row of a table of cards is one: its cells stand below one another, each after its column's name. A row
+// that an address leads to has these names too.
 function nameCells(table) {
   const names = [...table.tHead.rows[0].cells].map((header) => (header.innerText || header.textContent).replace(/\s+/g, " ").trim());
   for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, column) => (cell.dataset.column = names[column]));
 }
 
 for (const table of document.querySelectorAll("table")) {
-  if (table.tHead && table.classList.contains("cards")) nameCells(table);
+  if (table.tHead && (table.classList.contains("cards") || table.querySelector("tbody tr[id]"))) nameCells(table);
   makeSortable(table);
   if (table.matches(".matrix table, .tile table")) continue;
   const tools = document.createElement("p");

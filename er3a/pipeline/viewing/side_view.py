@@ -210,7 +210,7 @@ def side_view(
     )
     words = [_word(label, (place - low) / [wide, tall]) for label, place in placed]
     return Markup('<div class="arms" style="--ratio: {:.3f}">{}<div class="drawn">{}{}{}</div></div>').format(
-        wide / tall, Markup("").join(_name(arm) for arm in arms if arm.title), drawn, Markup("").join(words), scale
+        wide / tall, Markup("").join(map(_name, arms)), drawn, Markup("").join(words), scale
     )
 
 

@@ -232,17 +232,15 @@ def _look(robot: Robot, found: Finding) -> Markup:
     side = max(VIEWS, key=lambda each: np.linalg.norm((ways[0, -1, -1] - ways[0, 0, -1]) @ VIEWS[each]))
     own = int(robot.direction[found.joint - 1])
     kinds: dict[Kind, str] = {"right": N_("{value} is right"), "wrong": N_("enter {value}")}
-    seen = [*zip(kinds, ways @ VIEWS[side], (own, -own))]
-    size = 2 * RADIUS * float(np.ptp(seen[0][1][-1], axis=0).max())
-    drawn = side_view(
-        [SeenArm("", "", kind, way[-1], way=way) for kind, way, _ in seen],
-        ratio=1.0,
-        labels=[Label(tr(kinds[kind], value=fixed(value, 0)), way[-1, -1], kind) for kind, way, value in seen],
-        over=[
-            DrawnLine(seen[0][1][0], "before"),
-            *(DrawnLine(_headed(way[:, -1], size), f"turn {kind}") for kind, way, _ in seen),
-        ],
-    )
+    arms = [
+        SeenArm(tr(kinds[kind], value=fixed(value, 0)), "", kind, way[-1], way=way)
+        for kind, way, value in zip(kinds, ways @ VIEWS[side], (own, -own))
+    ]
+    size = 2 * RADIUS * float(np.ptp(arms[0].points_mm, axis=0).max())
+    turns = [DrawnLine(_headed(np.array(arm.way)[:, -1], size), f"turn {arm.kind}") for arm in arms]
+    labels = [Label(arm.title, arm.points_mm[-1], arm.kind) for arm in arms]
+    before = DrawnLine(np.array(arms[0].way)[0], "before")
+    drawn = side_view(arms, ratio=1.0, labels=labels, over=[before, *turns])
     title = tr("+J{joint}, {side}", joint=found.joint, side=tr(side))
     look = '<div class="look" data-entry="{}" data-next="{}"><b>{}</b>{}</div>'
     return Markup(look).format(found.entry, say(found), title, drawn)
