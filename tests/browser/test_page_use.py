@@ -126,7 +126,7 @@ def test_a_filter_stays_in_the_address(browser, small_study):
     """Which opens the fold that the table is in."""
     browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
     browser.execute_script("document.querySelectorAll('details').forEach((part) => (part.open = true))")
-    field = browser.find_element(By.CSS_SELECTOR, "#table-not-settled + .tools input")
+    field = browser.find_element(By.CSS_SELECTOR, "#table-entries-known + .tools input")
     table = "arguments[0].closest('.tools').previousElementSibling"
     shown = f"return [...{table}.querySelectorAll('tbody tr')].filter(row => !row.hidden).map(row => row.innerText)"
     everything = browser.execute_script(shown, field)
@@ -136,16 +136,22 @@ def test_a_filter_stays_in_the_address(browser, small_study):
     address = browser.current_url
     browser.get("about:blank")
     browser.get(address)
-    field = browser.find_element(By.CSS_SELECTOR, "#table-not-settled + .tools input")
+    field = browser.find_element(By.CSS_SELECTOR, "#table-entries-known + .tools input")
     assert field.is_displayed()
     assert field.get_property("value") == "α6"
     assert browser.execute_script(shown, field) == kept
 
 
 def test_a_link_into_a_fold_opens_it(browser, small_study):
-    browser.get((small_study.folder / "reports/index.html").as_uri())
-    browser.get(browser.find_element(By.CSS_SELECTOR, ".tile a[href$='#entry-a2']").get_attribute("href"))
+    browser.get((small_study.folder / "reports/er3a_c60_article/validation.html").as_uri() + "#entry-a2")
     assert browser.find_element(By.ID, "entry-a2").is_displayed()
+
+
+def test_a_cell_of_the_index_leads_to_its_place_in_the_picture(browser, small_study):
+    browser.get((small_study.folder / "reports/index.html").as_uri())
+    browser.get(browser.find_element(By.CSS_SELECTOR, ".tile a[href$='#cell-a2']").get_attribute("href"))
+    assert browser.execute_script("return scrollY") == 0
+    assert sorted(browser.execute_script(MARKED)) == ["label wrong shown", "mark right shown", "mark wrong shown"]
 
 
 def test_what_a_row_of_the_index_leads_to_has_the_whole_answer_in_one_screen(browser, small_study):

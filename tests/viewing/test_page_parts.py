@@ -14,7 +14,7 @@ from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.overview.search import TextOfPage
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.validation.page.evidence_section import rounded_within
+from er3a.pipeline.stages.validation.page.evidence_section import rounded_within, status_of
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.page import Head, Numbering
 from tests.conftest import ROOT
@@ -55,13 +55,15 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
     evidence = read_stage(tmp_path / name / "validation", STAGES["validation"]).results.summary.evidence
     stated = [each for each in evidence.entries if each.value is not None]
     for entry in stated:
-        link = re.escape(f'href="{name}/validation.html#entry-{entry.entry}"')
+        link = re.escape(f'href="{name}/validation.html#cell-{entry.entry}"')
         status, shown = re.search(rf'<td class="(\w+)" title="[^"]*"><a {link}[^>]*>(.*?)</a></td>', page).groups()
-        assert status == entry.status, entry
+        assert status == status_of(entry), entry
+        if status in ("contradicted", "settled"):
+            assert ("①" in shown) == (len(entry.by) == 1), entry
         if status != "contradicted":
             assert "→" not in shown
             continue
-        value, given = re.search(r"<s>(.*?)</s> <b><i>→</i>(.*?)</b>", shown.replace("−", "-")).groups()
+        value, given = re.search(r"<s>(.*?)</s> <b><i>→</i>([-.\d]+)", shown.replace("−", "-")).groups()
         assert float(value) == round(entry.value, 3), entry
         assert entry.interval[0] <= float(given) <= entry.interval[1], entry
     assert any("direction" in each.entry and each.status == "contradicted" for each in stated)

@@ -80,7 +80,10 @@ def _(results: TrajectoryResults | ProgramsResults) -> Glance:
         count, wrong = len(results.summary.programs), program_faults(results)
     else:
         count, wrong = len(results.summary.paths), path_faults(results)
-    caught = sum(fault.meant for fault in wrong)
+    caught, shapes = sum(fault.meant for fault in wrong), results.summary.verdict.shapes
+    if shapes and shapes.near:
+        note = tr("{count} within {far}", count=len(shapes.near), far=with_unit(fixed(shapes.margin_mm, 0), "mm"))
+        return f"{len(sound_motions(results))}/{count - caught}", note
     return f"{len(sound_motions(results))}/{count - caught}", _caught(caught)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.dynamics import payload_key
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.results import Stored
@@ -20,6 +21,7 @@ from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import ListRow, Mark
+from er3a.pipeline.viewing.page import whole_sentence
 
 Results = Mapping[str, Stored[Any]]
 FEW = 4  # rows of a tile: so many are seen whole on the first screen
@@ -94,7 +96,7 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     robot, results = study.robot(name), stored["workspace"].results
     drawing = from_above(robot, results, study.scene(name, "capability"), placing.tray, LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
-    carried, _ = payload_key(known, robot)
     answer = tr("Tray centre: {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
-    rest = tr("{where}. Payload {kg}.", where=placing.tray.where, kg=carried)
+    carried = joined(payload_key(known, robot)[::-1], ": ")
+    rest = joined(map(whole_sentence, (placing.tray.where, carried)), " ")
     return Tile(answer, rest, "pass", f"{name}/workspace.html", drawing=drawing)

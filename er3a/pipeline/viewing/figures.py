@@ -258,7 +258,7 @@ def bars(names: Sequence[str], sizes: Reals, texts: Sequence[str], colours: Sequ
     places = np.arange(len(names))
     ax.barh(places, sizes, 0.6, color=colours)
     for place, size, text in zip(places, sizes, texts):
-        end = ax.annotate(text, (max(size, 0.0), place), (7, 0), textcoords="offset points", va="center")
+        end = ax.annotate(text, (max(size, 0.0), place), (7, 0), textcoords="offset points", va="center", weight="bold")
         end.set_bbox({"facecolor": "white", "linewidth": 0, "pad": 1})  # over a line that marks a limit
     ax.set_yticks(places, names)
     ax.invert_yaxis()

@@ -648,7 +648,6 @@ addEventListener("beforeprint", () => document.querySelectorAll("details.section
 function nameCells(table) {
   const names = [...table.tHead.rows[0].cells].map((header) => (header.innerText || header.textContent).replace(/\s+/g, " ").trim());
   for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, column) => (cell.dataset.column = names[column]));
-  table.classList.toggle("named", table.classList.contains("cards"));
 }
 
 for (const table of document.querySelectorAll("table")) {
@@ -747,14 +746,13 @@ returnToPlace();
 // together is marked in the table; the evidence of an entry stands below.
 const entryOf = (hash) => hash?.slice(1).replace(/^(cell|entry)-/, "") || null;
 const entryLinks = document.querySelectorAll(".runs a[href^='#cell-'], .grid .entries a");
-const evidence = Object.assign(document.createElement("p"), { className: "evidence", role: "status" });
-if (entryLinks.length) document.querySelector(".side > :last-child").append(evidence);
+const evidence = Object.assign(document.createElement("b"), { className: "evidence", role: "status" });
+document.querySelector(".grid .key")?.prepend(evidence);
 const next = document.querySelector(".hero:has(.look) .fix"), first = next && [next.querySelector("span").lastChild.data, next.querySelector("a").hash];
 function showEntry(entry = entryOf(location.hash)) {
   for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
   const look = document.querySelector(".look.shown"); // of a joint that is to be jogged: the one thing to do says it
-  const cells = [...(document.getElementById(`entry-${entry}`)?.cells ?? [])].filter((cell) => textOf(cell) !== "–").slice(0, look ? -1 : undefined);
-  evidence.textContent = cells.map((cell, k) => (k < 3 ? "" : `${cell.dataset.column}${WORDS.colon}`) + textOf(cell)).join(" · ");
+  evidence.textContent = document.querySelector(`#cell-${entry} > a`)?.dataset.said ?? "";
   for (const link of document.querySelectorAll(".grid .key > a")) link.hash = document.getElementById(`entry-${entry}`)?.id ?? "marks";
   if (next) [next.querySelector("span").lastChild.data, next.querySelector("a").hash] = look ? [` ${look.dataset.next}`, `#cell-${entry}`] : first;
   for (const link of entryLinks) link.toggleAttribute("data-shown", [entryOf(link.hash), link.dataset.asked].includes(entry));
@@ -765,3 +763,9 @@ for (const link of entryLinks) {
 }
 addEventListener("hashchange", () => showEntry());
 showEntry();
+// The one thing to do opens lines to copy, and plays the jog again.
+const asking = document.querySelector(".hero .fix a");
+const jog = () => matchMedia("(prefers-reduced-motion: reduce)").matches || document.querySelectorAll(".look.shown animate").forEach((part) => part.beginElement());
+asking?.addEventListener("click", () => setTimeout(jog, 100));
+for (const lines of document.querySelectorAll(".hero .lines")) asking?.addEventListener("click", () => (lines.open = true));
+addEventListener("hashchange", jog);

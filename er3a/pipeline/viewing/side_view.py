@@ -33,7 +33,7 @@ COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
 SEEN_MM = 2.0  # by which two arms differ in a drawing
 ON_AXIS_MM = 1e-6
 # From where to where an entry of a row is seen, in shares of its way along its axis and of that to the next one.
-AT_JOINT = ((0.5, 0.0), (0.5, 0.0))
+AT_JOINT = ((0.66, 0.0), (0.66, 0.0))
 SEEN_AT = {"d": ((0.0, 0.0), (1.0, 0.0)), "a": ((1.0, 0.0), (1.0, 1.0))}
 SEEN_AT |= dict.fromkeys(("alpha", "beta", "offset"), ((1.0, 0.0), (1.0, 0.0)))
 BONE, THINNER = 0.045, 0.6  # an arm's thickness, of the height of what is drawn, and a wrong arm's of that over another
@@ -54,6 +54,7 @@ class SeenArm:
     kind : of its colour
     points_mm : (k, 2), the joints' places from the base to the flange: forward, up
     reach_mm : outlines (m, 2) of what the tool point reaches
+    way : (t, k, 2), mm, how it came there; None of an arm that did not move
     """
 
     title: str
@@ -61,6 +62,7 @@ class SeenArm:
     kind: Kind
     points_mm: Reals
     reach_mm: Sequence[Reals] = ()
+    way: Reals | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,6 +312,12 @@ def _arm(arm: SeenArm, thick: float) -> Markup:
         Markup('<circle cx="{:.0f}" cy="{:.0f}" r="{:.0f}"/>').format(x, -z, 0.22 * thick) for x, z in arm.points_mm
     )
     drawn = Markup(
-        '<polyline class="edge" points="{0}" stroke-width="{1:.0f}"/><polyline points="{0}" stroke-width="{2:.0f}"/>'
+        '<polyline class="edge" points="{0}" stroke-width="{1:.0f}">{3}</polyline>'
+        '<polyline points="{0}" stroke-width="{2:.0f}">{3}</polyline>'
     )
-    return Markup('<g class="bones {}">{}{}</g>').format(arm.kind, drawn.format(line, thick, 0.78 * thick), joints)
+    moved = Markup("")
+    if arm.way is not None:
+        joints, steps = moved, ";".join(map(_line, arm.way))
+        moved = Markup('<animate attributeName="points" dur="2s" begin="indefinite" values="{}"/>').format(steps)
+    drawn = drawn.format(line, thick, 0.78 * thick, moved)
+    return Markup('<g class="bones {}">{}{}</g>').format(arm.kind, drawn, joints)

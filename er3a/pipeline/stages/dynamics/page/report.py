@@ -68,8 +68,10 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
     lever = kg @ off
     far = off @ lever / np.linalg.norm(lever)
     torques = abs(held.torque) * kg * far / (kg @ far)
-    texts = [f"{with_unit(number(m, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}" for m, way in zip(kg, far)]
-    names = [tr("link {number}", number=each.link) for each in links]
+    levers = (f"{with_unit(number(m, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}" for m, way in zip(kg, far))
+    numbered = (tr("link {number}", number=each.link) for each in links)
+    names = ["\n".join(each) for each in zip(numbered, levers)]
+    texts = [with_unit(fixed(each, 1), held.unit) for each in torques]
     figure, ax = bars(names, torques, texts, [JOINTS[each.link - 1] for each in links])
     figure.set_figheight(TALL)
     ax.set_xlabel(axis_label(model.TorqueRows, "torque", held.unit))
@@ -108,7 +110,6 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         uses=[use_text(use) for use in summary.uses[:MAX_USES]],
         motors=_motors(summary.motors),
         needs=[_need(results, motor) for motor in summary.motors],
-        file=file,
         limited=_limited(summary),
         paths=[_path(path) for path in summary.paths if path.counts],
         not_run=joined((path.name for path in summary.paths if not path.counts), ", "),
@@ -188,7 +189,7 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
                 (tr("Holding, in the worst pose found"), still),
             )
         ],
-        None if limited else Fix(todo, "#motors", False),
+        None if limited else Fix(todo, "#drives", False),
     )
 
 

@@ -199,7 +199,7 @@ def _to_do(
         return text, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe":
         near = near_assumed(path, summary)
-        text = N_("Measure {pair}: shapes may be off by at most {far} mm.")
+        text = N_("Measure {pair}: passes if shapes are right to {far} mm.")
         measure = tr(text, pair=say(near.pair), far=fixed(near.clearance_mm, 1)) if near else ""
         return joined([*remedies(path.of_program), measure], " "), None
     last = path.sound_end

@@ -19,7 +19,7 @@ from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS, ent
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.pipeline.viewing.answer import ListRow
-from er3a.pipeline.viewing.page import panel_link
+from er3a.pipeline.viewing.page import panel_link, whole_sentence
 from er3a.references.quantities import MM
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -54,7 +54,6 @@ OPEN_COLUMNS = (
     N_("Evidence leaves open"),
     N_("Documents"),
     N_("Tool off by"),
-    N_("Fits as well"),
     N_("What would settle it"),
 )
 OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
@@ -78,11 +77,12 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     left = [each for each in numbers if each.status not in SETTLED]
     left.sort(key=lambda each: (not each.off.moves, _unbounded(each), -each.off.mm, -each.off.deg))
     proposals = {proposal.entry: to_settle(proposal) for proposal in evidence.proposals}
+    todo = {each.entry: proposals[each.entry] for each in evidence.proposals if not is_one(each, "look_at_motion")}
     present = {status_of(each) for each in numbers}
     first = [ListRow("fail", entry_word(each.entry), _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
-        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
+        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence, todo) for kind in kinds]) for joint in joints],
         legend=[
             (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))
             for status in MARKS
@@ -90,9 +90,9 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
         ],
         open_columns=OPEN_COLUMNS,
         open_rows=[
-            [*_row(each, evidence), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left
+            [*_row(each, evidence), _tool_off(each), proposals.get(each.entry, "–")]
+            for each in (*left, *(each for each in numbers if each.status in SETTLED))
         ],
-        settled_rows=[_row(each, evidence) for each in numbers if each.status in SETTLED],
         looks=[each for each in evidence.proposals if is_one(each, "look_at_motion")],
         first=first if evidence.contradicted else to_confirm(evidence),
     )
@@ -214,19 +214,32 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
+def _cell(each: EntryEvidence | None, evidence: TableEvidence, proposals: Mapping[str, str]) -> dict[str, Any] | None:
     """An entry in the table; None where there is none."""
     if each is None or each.value is None:
         return None
+    single = len(each.by) == 1
     return dict(
         entry=each.entry,
         value=_plain(each.value),
         status=status_of(each),
-        mark=MARKS[status_of(each)],
+        mark=MARKS[status_of(each)] + MARKS["consistent"] * (single and status_of(each) == "settled"),
         title=tr("{entry}: {status}", entry=entry_word(each.entry), status=_status(status_of(each))),
         gives=_other_given(each, evidence),
-        single=len(each.by) == 1,
+        said=_said(each, evidence, proposals),
+        single=single,
     )
+
+
+def _said(each: EntryEvidence, evidence: TableEvidence, proposals: Mapping[str, str]) -> str:
+    """What is known of an entry, and what to do, in short sentences."""
+    other, status = _other_given(each, evidence), status_of(each)
+    first = word("status_meaning", STATUS_MEANINGS, status)
+    if other:
+        text = N_("it is {value}") if status == "contradicted" else N_("it could be {value}")
+        first = tr(text, value=with_unit(other, each.unit))
+    said = map(whole_sentence, filter(None, (first, proposals.get(each.entry, ""))))
+    return joined([entry_word(each.entry), joined(said, " ")], ": ")
 
 
 def status_of(each: EntryEvidence) -> Status:
@@ -291,15 +304,6 @@ def _off(mm: float, deg: float) -> str:
     if turned == "0.0":
         return with_unit(far, "mm")
     return tr("{mm} mm, {deg}°", mm=far, deg=turned)
-
-
-def _fits(each: EntryEvidence) -> str:
-    """Other values that independent documents allow, and that make another robot."""
-    named = (
-        joined([f"{entry_word(name)} = {_plain(value)}" for name, value in reading.entries], ", ")
-        for reading in _others(each)
-    )
-    return joined(named) or "–"
 
 
 def _others(each: EntryEvidence) -> list[OtherReading]:

@@ -46,6 +46,7 @@ from er3a.pipeline.viewing.page import (
 from er3a.pipeline.viewing.side_view import (
     UPRIGHT,
     DrawnLine,
+    Kind,
     Label,
     LabelKind,
     SeenArm,
@@ -62,11 +63,12 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 ANGLES = ("alpha", "beta", "offset")
-AROUND = np.radians(np.linspace(-110.0, 110.0, 31))  # of an arrow around an axis: open at the back
+AROUND = np.radians(np.linspace([-110.0, -220.0], [110.0, 80.0], 31)).T  # of an arrow over an axis, and around one
 HEAD = 0.5  # of its radius, the length of its head
-TILT = 0.35  # of a circle around an axis in the drawing's plane, seen a little from above
+TILT = 0.5  # of a circle around an axis in the drawing's plane, seen a little from above
 RADIUS = 0.045  # of such an arrow, of the size of the arm
 BELOW = 0.15  # of a reach: from one line to the next below the base
+LARGER = 10  # the difference between what documents state, in its drawing
 LABELLED = 5  # of the lengths that are wrong, at most, so that words have room
 UP, MARK_MM = [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)], 1000.0  # where a mark on the flange is that is seen to turn
 JOG = np.radians(np.linspace(0.0, 30.0, 13))  # of a joint that one looks at
@@ -182,6 +184,12 @@ def _both_arms(
             text = joined([with_unit(fixed(stated.expected, 1), each.unit), own_title(stated.document)], ": ")
             labels.append(Label(text, np.array([0.0, -step * row]), kind, "seen", written_there=True))
             over += dimension(stated.expected, -step * (row + 0.5), own.points_mm[-1, 1], kind)
+        ends = np.array([stated.expected for stated in each.statements])[[0, -1]]
+        wide = ends.mean() - 2 * step + LARGER * (ends - ends.mean())
+        corners = np.array([[ends[0], *wide, ends[1]], [2 * step, step, step, 2 * step]])
+        over.append(DrawnLine(corners.T, "dimension open"))
+        text = tr("{far}, {times} times larger", far=with_unit(fixed(np.ptp(ends), 1), each.unit), times=LARGER)
+        labels.append(Label(text, np.array([wide.min(), 0.7 * step]), "open", "seen", written_there=True))
     cells = {cell["entry"]: cell for _, row in evidence.get("rows", ()) for cell in row if cell}
     lines, right = entry_lines(robot, cells, q), entry_lines(other, cells, q) if off and other else {}
     worst = [row.address for row in evidence.get("first", ())[:LABELLED]]
@@ -200,6 +208,8 @@ def _both_arms(
             text = f"{entry_word(entry)}: {said}{'?' * (kind == 'open')}"
             labels.append(Label(text, lines[entry].mean(0), kind, entry))
         over.append(DrawnLine(lines[entry], f"mark {own.kind}", entry))
+        if angle and kind == "open" and gives:
+            over += _readings(robot, q, entry, (cell["value"], gives), radius)
         if entry in right:
             over.append(DrawnLine(right[entry], "mark right", entry, gives or cell["value"]))
     labels += off
@@ -220,17 +230,34 @@ def _look(robot: Robot, found: Finding) -> Markup:
         tips = flanges @ flanges[0, 0].T @ mark
         ways = np.stack([np.zeros_like(tips), MARK_MM * tips], axis=2)
     side = max(VIEWS, key=lambda each: np.linalg.norm((ways[0, -1, -1] - ways[0, 0, -1]) @ VIEWS[each]))
-    right, wrong = ways @ VIEWS[side]
+    own = int(robot.direction[found.joint - 1])
+    kinds: dict[Kind, str] = {"right": N_("{value} is right"), "wrong": N_("enter {value}")}
     arms = [
-        SeenArm(tr("{entry} is right", entry=entry_word(found.entry)), "", "right", right[-1]),
-        SeenArm(tr("turn its sign"), "", "wrong", wrong[-1]),
+        SeenArm(tr(kinds[kind], value=fixed(value, 0)), "", kind, way[-1], way=way)
+        for kind, way, value in zip(kinds, ways @ VIEWS[side], (own, -own))
     ]
-    size = 2 * RADIUS * float(np.ptp(right[-1], axis=0).max())
-    over = [DrawnLine(_headed(way[:, -1], size), look) for way, look in ((right, "turn right"), (wrong, "turn wrong"))]
+    size = 2 * RADIUS * float(np.ptp(arms[0].points_mm, axis=0).max())
+    turns = [DrawnLine(_headed(np.array(arm.way)[:, -1], size), f"turn {arm.kind}") for arm in arms]
+    labels = [Label(arm.title, arm.points_mm[-1], arm.kind) for arm in arms]
+    before = DrawnLine(np.array(arms[0].way)[0], "before")
+    drawn = side_view(arms, ratio=1.0, labels=labels, over=[before, *turns])
     title = tr("+J{joint}, {side}", joint=found.joint, side=tr(side))
-    return Markup('<div class="look" data-entry="{}" data-next="{}"><b>{}</b>{}</div>').format(
-        found.entry, say(found), title, side_view(arms, ratio=1.0, over=over)
-    )
+    look = '<div class="look" data-entry="{}" data-next="{}"><b>{}</b>{}</div>'
+    return Markup(look).format(found.entry, say(found), title, drawn)
+
+
+def _readings(robot: Robot, q: Reals, entry: str, values: Sequence[str], size: float) -> list[DrawnLine]:
+    """Where the flange's z points, or its x if a turn about z is asked for, for each of an angle's values."""
+    column, found = column_of(entry), list[DrawnLine]()
+    axis = "z" if column == "alpha" else "x"
+    for value, look in zip(values, ("right", "open")):
+        table = getattr(robot, column).copy()
+        table[int(entry.removeprefix(column)) - 1] = np.radians(float(value.replace("−", "-")))
+        T = frames(robot.replace(**{column: table}), q)[-1, :3:2]
+        way = 1000 * T[:, 3] + size * np.outer(np.arange(4), T[:, "xyz".index(axis)])
+        text = tr("{axis} if {value}", axis=axis, value=with_unit(value, "deg"))
+        found.append(DrawnLine(_headed(way, size), f"mark reading {look}", entry, text))
+    return found
 
 
 def _turn_arrow(robot: Robot, q: Reals, entry: str, at: Reals, radius: float) -> DrawnLine:
@@ -240,7 +267,8 @@ def _turn_arrow(robot: Robot, q: Reals, entry: str, at: Reals, radius: float) ->
     axis = robot.direction[joint - 1] * frames(robot, q)[joint - 1, :3, 2]
     across = abs(axis[1]) > np.sqrt(0.5)
     first = [0.0, 0.0, 1.0] if across else [0.0, -1.0, 0.0]
-    ring = np.outer(np.cos(AROUND), first) + np.outer(np.sin(AROUND), np.cross(axis, first))
+    turn = AROUND[0 if across else 1]
+    ring = np.outer(np.cos(turn), first) + np.outer(np.sin(turn), np.cross(axis, first))
     seen = ring[:, ::2] + TILT * ring[:, 1:2] * np.abs(axis[::2])
     return DrawnLine(_headed(at + radius * seen, radius), "turn", entry, f"J{joint}")
 

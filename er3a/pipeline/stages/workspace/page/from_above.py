@@ -17,7 +17,7 @@ from er3a.robots.robot import Robot
 AROUND = 1.1  # of the reach, that is shown to each side
 DEAD = 0.2  # rad that axis 1 does not turn to: there is room for a word
 LETTER = 0.3  # half the width of a letter, of its height
-BASE = 0.06  # of the reach: radius of the dot at axis 1
+BASE, AXES = 0.06, 0.3  # of the reach: radius of the dot at axis 1, length of x and y
 
 
 def from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, tray: Tray, letters: float) -> Markup:
@@ -50,6 +50,8 @@ def from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, tra
     if gap > DEAD:
         parts.append(Markup('<path class="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
         words.append(_word(0.85 * reach * _way(high + gap / 2), height, tr("dead zone"), "", size))
+    parts.append(Markup('<path class="axes" d="M{0:.0f},0H0V-{0:.0f}"/>').format(AXES * reach))
+    words += [_word((AXES + BASE) * reach * way, height, axis, "", size) for axis, way in zip("xy", np.eye(2))]
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import FORMATS, joined, say
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
 from er3a.pipeline.results import Stored
@@ -36,7 +36,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     payload = joined([payload_text(known, robot), there], " ")
     trays = [each.tray for each in placing.tried] if placing else []
     settled = stored.table != "unsettled"
-    answer = _answer(summary, placing, payload_key(known, robot), settled)
+    rows = _tray_as_rows(placing, settled)
+    answer = _answer(summary, placing, payload_key(known, robot), rows)
     arms = [(robot, results)]
     instead = alternative_table(study, stored.robot, stored.folder) if contradicted else None
     if instead and (right := found_by(stored, "workspace", f"../{instead}")):
@@ -49,7 +50,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         output,
         answer,
         labelled=_labelled(arms, floor_of(study.scene(instead or stored.robot, "capability")), contradicted),
-        turning=workspace_figures.in_space(robot, results, scene, trays),
+        turning=workspace_figures.in_space(robot, results, scene, trays, [row.mark for row in rows]),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
         tray_lines=placing.tray.lines if placing and settled else "",
@@ -69,14 +70,13 @@ def _labelled(
 
 
 def _answer(
-    summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str], settled: bool
+    summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str], rows: Sequence[ListRow]
 ) -> Answer:
-    """How far the arm reaches, its voids, where the tray goes, and the ``payload``;
-    ``settled``: whether documents settle anything of the table, or else no place of the tray passes."""
+    """How far the arm reaches, its voids, where the tray goes, in ``rows``, and the ``payload``."""
     # The void that the picture shows comes first.
     in_order = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     volume, voids = summary.volume_m3, [_void_as_row(*each) for each in in_order]
-    rest, fix, rows = "", None, _tray_as_rows(placing, settled)
+    rest, fix = "", None
     counted = tr("Voids: {count}.", count=len(voids)) if voids else ""
     if placing and rows[0].mark == "pass":
         tray = placing.tray
@@ -98,9 +98,9 @@ def _answer(
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: which one, how large."""
-    note = if_normal(void, with_unit(workspace_figures.litres(void), "L"))
-    if not void.holds_shoulder:
-        note = joined([note, *map(FORMATS["limit"], void.cause.params.get("limits", ()))], ", ")
+    note, limits = if_normal(void, with_unit(workspace_figures.litres(void), "L")), void.cause.params.get("limits", ())
+    if [each.joints for each in limits] == [(1,), (1,)] and limits[0].limit == -limits[1].limit:
+        note = tr("behind the arm: J1 stops at ±{deg:g}°", deg=abs(limits[0].limit))
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
 
 

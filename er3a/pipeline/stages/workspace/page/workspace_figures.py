@@ -71,13 +71,15 @@ BODY_BLOCKS = (36, 56, 60)  # of the reached body, along radius, height and arou
 SMOOTHED = 8  # times that its corners go to the mean of their neighbours
 
 
-def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None, trays: Sequence[Tray]) -> Markup:
+def in_space(
+    robot: Robot, results: model.WorkspaceResults, scene: Scene | None, trays: Sequence[Tray], marks: Sequence[str]
+) -> Markup:
     """What is proven reachable with its voids, the scene, the trays and the arm at zero, in a figure that turns; of an
     arm that reaches no more than a plane the points that were sampled.
 
     Parameters
     ----------
-    trays : the first is the one that is proposed
+    trays, marks : the first is the one that is proposed; how each is marked in the list
     """
     vertices, triangles = results.void_vertices, results.void_triangles
     if results.summary.is_flat:
@@ -96,8 +98,8 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None,
         middle = axis.point_m + border.z_m[far] * np.array(axis.direction)
         ways = [(middle.tolist(), (middle + border.rho_m[far] * AHEAD).tolist(), reaches(results.summary))]
     solids = surroundings(robot, scene, ways)
-    for i, tray in enumerate(trays, start=1):
-        colour = VERDICTS["pass" if i == 1 else "caution"]
+    for i, (tray, mark) in enumerate(zip(trays, marks), start=1):
+        colour = VERDICTS[mark]
         drawn, *stand = drawn_scene(tray.parts, robot)
         parts = [drawn | {"colour": colour}, *stand]
         shown = f"tray-{i}", _reaching_in(robot, tray), _ways(tray)
@@ -173,10 +175,12 @@ def labelled(
         points = skeleton(robot, np.zeros(robot.joints)) - summary.axis.point_m
         arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
         lines = border_lines(border.arc, border.rho_m, border.z_m)
-        seen.append(SeenArm(own_title(robot.title), "", kind, arm, lines))
-        outer = np.concatenate(lines)
+        seen.append(SeenArm(own_title(robot.title), reaches(summary) if arms[1:] else "", kind, arm, lines))
         if kind == "wrong" or not contradicted:
             labels += void_labels(summary, kind)
+        if arms[1:]:  # what the wrong one reaches would make both arms small
+            continue
+        outer = np.concatenate(lines)
         far, height = outer[outer[:, 0].argmax()]
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([far / 2, below - BELOW * far]), kind, "reach"))
@@ -228,5 +232,5 @@ def void_labels(summary: model.WorkspaceSummary, kind: Kind = "right") -> list[L
             labels.append(Label(said, at, "hole", f"hole-{number_}", start, written_there=True))
         elif not void.holds_shoulder:
             within = 1000 * np.array([INSIDE * low, (void.centroid_m[2] + void.high_m[2]) / 2])
-            labels.append(Label(tr("void {size}", size=about(void)), within, kind, written_there=True))
+            labels.append(Label(tr("wrong table's void, {size}", size=about(void)), within, kind, written_there=True))
     return labels
