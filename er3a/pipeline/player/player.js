@@ -109,6 +109,7 @@ function draw() {
     for (const event of now) if ((event.status !== "caution") === grave) for (const name of event.bodies) colours.set(name, css);
   }
   const touching = new Set([...colours.keys()].filter((name) => colours.get(name) === data.colours.touching));
+  for (const [j, { status }] of failing()) colours.set(j, data.colours[status]);
   const poses = arms.map((arm, k) => posesOf(arm, valuesAt(motion.times, motion.values[k], t)));
   const { page } = space;
   if (space.target !== motion.target) Object.assign(space, { target: motion.target, distance: (space.distance * motion.length) / space.length, length: motion.length });
@@ -146,13 +147,14 @@ function draw() {
   if (wrong && from[2] < floor) space.word(words.through, from, page.touching);
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
   space.keepClear([...axes.flatMap(([a, b]) => [b, scaled(add(a, b), 0.5)]), motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
+  const css = touching.size || wrong ? page.touching : page.ink;
   for (const { from, to, text } of marks) {
-    const css = touching.size || wrong ? page.touching : page.ink;
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
     else space.line([from, to], ...(text ? [css, 4] : [data.colours.sight, 1.5, false]));
     if (text && String(from) !== String(to)) for (const end of [from, to]) space.dot(end, css, 4);
-    if (text) space.word(text, scaled(add(from, to), 0.5), css);
+    space.keepClear([0, 0.25, 0.5, 0.75, 1].map((part) => add(scaled(from, 1 - part), scaled(to, part))), 0);
   }
+  for (const { from, to, text } of marks) if (text) space.word(text, scaled(add(from, to), 0.5), css);
   if (motion.loads) tellLoads(poses[0]);
   for (const [j, { status }] of failing()) {
     if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
@@ -212,7 +214,7 @@ function tell() {
   clock.textContent = said.replace("{t}", at).replace("{end}", last);
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
-  const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : apart ? words.apart.replace("{off}", apart) : motion.text;
+  const ends = playedUntil() < end() ? words.ends : apart ? words.apart.replace("{off}", apart) : motion.text;
   show(nowShown, (now[0]?.status === "plain" ? now.at(-1) : now[0])?.text || ends); // the first fault is the cause
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
@@ -220,7 +222,7 @@ function tell() {
   const on = stretches.filter(({ dataset }) => dataset.play === motion.name && isNow({ t: Number(dataset.from), until: Number(dataset.t) }));
   for (const part of stretches) {
     const now = part === on[0] || (on.includes(part) && part.dataset.from === part.dataset.t); // where two meet, the first; what has no motion too
-    if (now && !part.classList.contains("now")) listed(part);
+    if (now && !part.classList.contains("now")) listed(part), part.dataset.fix && dispatchEvent(new CustomEvent("advice", { detail: part }));
     part.classList.toggle("now", now);
   }
 }

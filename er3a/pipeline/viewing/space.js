@@ -95,8 +95,9 @@ export class Space extends Orbit {
       mesh.matrix.multiplyMatrices(matrix(poses[Math.min(shape.frame, poses.length - 1)]), local);
       mesh.updateMatrixWorld(true);
       const through = shape.pale || pale(mesh);
-      const marked = !shape.pale && colours.has(shape.name); // a floor is not red all over
-      mesh.material = this.material(marked ? colours.get(shape.name) : shape.pale ? (shape.own ?? this.page.grid) : shape.colour, through, marked);
+      const css = colours.get(shape.kind === "cylinder" ? shape.joint : null) ?? colours.get(shape.name);
+      const marked = !shape.pale && Boolean(css); // a floor is not red all over
+      mesh.material = this.material(marked ? css : shape.pale ? (shape.own ?? this.page.grid) : shape.colour, through, marked);
       mesh.castShadow = !through;
       mesh.visible = true;
     }
@@ -204,6 +205,7 @@ export class Space extends Orbit {
   dot(point, css, radius, ring = false) {
     const [cx, cy] = this.seen(point);
     this.#svg("circle", { cx, cy, r: radius, fill: css, stroke: this.page.halo, "stroke-width": 1.5 });
+    if (ring) this.taken.push([cx, cy, 8 * radius, 8 * radius]);
     for (const share of ring ? [2.4, 4] : []) this.#svg("circle", { cx, cy, r: share * radius, fill: "none", stroke: css, "stroke-width": 4 / share });
   }
 
