@@ -139,7 +139,7 @@ function draw() {
   const axes = (wrong ? [] : poses).flatMap((own) => [0, 1, 2].map((c) => [column(own.at(-1), 3), add(column(own.at(-1), 3), scaled(column(own.at(-1), c), 0.09 * data.size))]));
   axes.forEach((axis, i) => space.line(axis, data.axes[i % 3], 3));
   const worst = GRAVEST.find((status) => now.some((event) => event.status === status)); // what comes with it is not named
-  for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j]);
+  for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j], failing().has(j));
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   const [from, to] = poses.map((own) => column(own.at(-1), 3));
   if (wrong) apart = `${fixed(1000 * Math.hypot(...subtract(from, to)), 0)} mm`;
@@ -150,8 +150,10 @@ function draw() {
   const css = touching.size || wrong ? page.touching : page.ink;
   for (const { from, to, text } of marks) {
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
-    else space.line([from, to], ...(text ? [css, 4] : [data.colours.sight, 1.5, false]));
-    if (text && String(from) !== String(to)) for (const end of [from, to]) space.dot(end, css, 4);
+    else {
+      space.line([from, to], text ? css : page.ink, text ? 4 : 2);
+      for (const end of text ? [from, to] : []) space.dot(end, css, 4);
+    }
     space.keepClear([0, 0.25, 0.5, 0.75, 1].map((part) => add(scaled(from, 1 - part), scaled(to, part))), 0);
   }
   for (const { from, to, text } of marks) if (text) space.word(text, scaled(add(from, to), 0.5), css);
@@ -176,11 +178,11 @@ function sticks(poses, css, shown) {
   return off.length ? off.reduce((a, b) => (away(b) > away(a) ? b : a)) : [];
 }
 
-/** The axis of row `j`, whose frame is `T`, through the whole picture. */
-function singularAxis(j, T) {
+/** The axis of row `j`, whose frame is `T`, through the whole picture; with its name, unless the joint is named. */
+function singularAxis(j, T, named) {
   const [middle, way] = [moved(T, data.rows[j - 1].middle), scaled(column(T, 2), 0.3 * data.size)];
   space.line([subtract(middle, way), add(middle, way)], data.colours.caution, 2.5);
-  space.word(`J${j}`, add(middle, way), space.page.doubtful);
+  if (!named) space.word(`J${j}`, add(middle, way), space.page.doubtful);
 }
 
 /** What each joint bears now, as a bar of the most that any bears on this motion. */
