@@ -75,7 +75,6 @@ REMEDIES: dict[str, str] = words(
         **dict.fromkeys(OUT_OF_REACH, NEARER),
         "later_out_of_reach": LATER,
         "configuration_ends": "End the line before that point: it does not lead on in this configuration.",
-        "joint_jumps": "Teach the target with this joint near to where it comes from.",
         "whole_turn": "Teach the target with the nearer angle, unless the turn is meant to unwind cables.",
         "arrives_otherwise": "Teach the target again where the line arrives.",
         "configuration_not_met": "Teach the target again, or correct its configuration.",
@@ -162,6 +161,7 @@ TEXTS = texts(
         "load_above_payload": "{mass_kg:g} kg on the flange; payload {payload_kg:g} kg",
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
         "remedy.limit": "Keep J{joint} within {limit:g}°; turn or move a target given as a pose.",
+        "remedy.jump": "Teach the target with J{joint} near {near:.0f}°, not at {target:.0f}°.",
         "remedy.end": "End it at ({end_mm:.1f, }) mm: {margin_mm:.1f} mm clear.",
         "remedy.solid": (
             "[Add a via point around {name}: the target itself is clear.{there:!}][Move the target away from "
@@ -234,6 +234,12 @@ def _(found: Finding) -> str:
 @advises("above_limit", "below_limit")
 def _(found: Finding) -> str:
     return sentence("remedy.limit", joint=found.joint, limit=found.limit_deg)
+
+
+@advises("joint_jumps")
+def _(found: Finding) -> str:
+    near = found.near_deg
+    return sentence("remedy.jump", joint=found.joint, near=near, target=near + found.angle_deg)
 
 
 @says("way_out_of_reach")

@@ -156,7 +156,10 @@ function draw() {
     }
     space.keepClear([0, 0.25, 0.5, 0.75, 1].map((part) => add(scaled(from, 1 - part), scaled(to, part))), 0);
   }
+  const before = space.taken.length;
+  space.keepClear(motion.trails[0], 0);
   for (const { from, to, text } of marks) if (text) space.word(text, scaled(add(from, to), 0.5), css);
+  space.taken.splice(before, motion.trails[0].length); // other words may lie on the path
   if (motion.loads) tellLoads(poses[0]);
   for (const [j, { status }] of failing()) {
     if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);

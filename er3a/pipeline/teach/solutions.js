@@ -19,7 +19,7 @@ function element(tag, className, text = "", parts = []) {
 export class SolutionList {
   /** `choose(q)` moves the arm; `ghost(q)` shows a pale one, null takes it away; `overlap(q)` says what collides. */
   constructor(data, arm, choose, ghost, overlap) {
-    Object.assign(this, { data, arm, choose, ghost, overlap });
+    Object.assign(this, { data, arm, choose, ghost, overlap, refused: byId("refused") });
     byId("previous").addEventListener("click", () => this.#step(-1));
     byId("next").addEventListener("click", () => this.#step(1));
   }
@@ -121,7 +121,8 @@ export class SolutionList {
     button.setAttribute("aria-disabled", String(!row.withinLimits));
     button.addEventListener("click", () => {
       if (row.withinLimits) this.choose(row.q);
-      write(byId("refused"), row.withinLimits ? "" : fill(this.data.words.not_moved, { reasons: beyondLimits(this.data, row.q).join(this.data.words.separator) }));
+      else button.after(this.refused);
+      write(this.refused, row.withinLimits ? "" : fill(this.data.words.not_moved, { reasons: beyondLimits(this.data, row.q).join(this.data.words.separator) }));
     });
     for (const event of ["pointerenter", "focus"]) button.addEventListener(event, () => this.ghost(row.q));
     for (const event of ["pointerleave", "blur"]) button.addEventListener(event, () => this.ghost(null));
@@ -132,7 +133,7 @@ export class SolutionList {
   #step(by) {
     const order = this.buttons.map((button) => Number(button.dataset.row)).filter((row) => this.rows[row].withinLimits);
     const at = order.indexOf(this.current);
-    write(byId("refused"), "");
+    write(this.refused, "");
     this.choose(this.rows[order[(at + by + order.length) % order.length]].q);
   }
 }
