@@ -192,10 +192,8 @@ def _clearance(target: model.TargetResult) -> str:
 
 
 def _branch_rows(branches: model.SolutionRows) -> list[list[str]]:
-    ranks = branches.rank[branches.rank > 0]
     cells = []
     for k in range(len(branches)):
-        place = int((ranks <= branches.rank[k]).sum())
         cells.append(
             [
                 panel_link(branches.q_deg[k], _on_one_line(branches.label[k], int(branches.branch[k]))),
@@ -203,7 +201,7 @@ def _branch_rows(branches: model.SolutionRows) -> list[list[str]]:
                 fixed(branches.limit_margin_deg[k], 1),
                 fixed(branches.manipulability[k], 3),
                 fixed(branches.greatest_move_deg[k], 1),
-                _outcome(branches, k, tr("chosen") if place == 1 else tr("choice {place}", place=place)),
+                _outcome(branches, k, tr("choice {place}", place=k + 1) if k else tr("chosen")),
             ]
         )
     return cells

@@ -42,7 +42,7 @@ from er3a.robots.robot import Robot
 SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
 LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
 MIN_LENGTH = 1e-6  # m
-DASHES_M = 0.016  # at most, from one dash to the next, of the rest of a path that the arm does not reach
+DASHES = 3  # of the rest of a path that the arm does not reach
 SINGULAR_AXES = {"wrist": (4, 6), "elbow": (2, 3), "shoulder": (1,)}  # rows of the table that such a pose is of
 RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
 
@@ -356,12 +356,9 @@ def _beyond(path: model.PathSummary, rows: model.PathChecks) -> list[Mark]:
     """The rest of a path that ends beyond the reach, dashed, and how far beyond it ends; ``rows``: of the path."""
     if not path.unreachable or rows.reachable[-1]:
         return []
-    rest = rows.xyz_mm[np.flatnonzero(rows.reachable).max(initial=0) :] / 1000
-    way = np.append(0.0, np.linalg.norm(np.diff(rest, axis=0), axis=1).cumsum())
-    at = np.linspace(0.0, way[-1], 2 * int(np.ceil(way[-1] / DASHES_M)) + 1)
-    points = np.transpose([np.interp(at, way, column) for column in rest.T]).tolist()
-    dashes = [Mark(0.0, path.duration_s, *ends, "") for ends in zip(points[1::2], points[2::2])]
-    return [*dashes[:-1], *(replace(last, text=_few_words(path.unreachable[-1])) for last in dashes[-1:])]
+    at = np.linspace(np.flatnonzero(rows.reachable).max(initial=0), len(rows) - 1, 2 * DASHES + 1).astype(int)
+    points, said = (rows.xyz_mm[at] / 1000).tolist(), [*[""] * (DASHES - 1), _few_words(path.unreachable[-1])]
+    return [Mark(0.0, path.duration_s, *ends) for ends in zip(points[1::2], points[2::2], said)]
 
 
 def _touching(cause: object) -> tuple[str, ...]:
