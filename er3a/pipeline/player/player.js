@@ -142,29 +142,23 @@ function draw() {
   for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j], failing().has(j));
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   const [from, to] = poses.map((own) => column(own.at(-1), 3));
-  if (wrong) apart = `${fixed(1000 * Math.hypot(...subtract(from, to)), 0)} mm`;
-  if (wrong) marks.push({ from, to, text: apart });
+  if (wrong) marks.push({ from, to, text: (apart = `${fixed(1000 * Math.hypot(...subtract(from, to)), 0)} mm`) });
   if (wrong && from[2] < floor) space.word(words.through, from, page.touching);
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
   space.keepClear([...axes.flatMap(([a, b]) => [b, scaled(add(a, b), 0.5)]), motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   const css = touching.size || wrong ? page.touching : page.ink;
   for (const { from, to, text } of marks) {
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
-    else {
-      space.line([from, to], text ? css : page.ink, text ? 4 : 2);
-      for (const end of text ? [from, to] : []) space.dot(end, css, 4);
-    }
+    else space.line([from, to], text ? css : page.ink, text ? 4 : 2), text && [from, to].forEach((end) => space.dot(end, css, 4));
     space.keepClear([0, 0.25, 0.5, 0.75, 1].map((part) => add(scaled(from, 1 - part), scaled(to, part))), 0);
   }
-  const before = space.taken.length;
-  space.keepClear(motion.trails[0], 0);
-  for (const { from, to, text } of marks) if (text) space.word(text, scaled(add(from, to), 0.5), css);
-  space.taken.splice(before, motion.trails[0].length); // other words may lie on the path
   if (motion.loads) tellLoads(poses[0]);
   for (const [j, { status }] of failing()) {
     if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
   }
   if (moves && arms.length === 1) nameEnds(motion.trails[0]);
+  space.keepClear(motion.trails[0], 0);
+  for (const { from, to, text } of marks) if (text) space.word(text, scaled(add(from, to), 0.5), css);
   data.signs.forEach(({ text, at }, k) => space.word(text, wrong ? column(poses[k][3], 3) : at, k === 0 && wrong ? page.touching : page.ink));
   space.names(surroundings, touching);
   space.end();
@@ -339,10 +333,9 @@ function dock(edge = 0) {
 }
 
 const step = (sign) => {
-  const i = motion.times.findIndex((time) => time > t + 1e-9);
-  const before = motion.times.findLastIndex((time) => time < t - 1e-9);
+  const next = sign > 0 ? motion.times.find((time) => time > t + 1e-9) : motion.times.findLast((time) => time < t - 1e-9);
   play(false);
-  goTo(null, motion.times[sign > 0 ? (i < 0 ? motion.times.length - 1 : i) : Math.max(0, before)]);
+  goTo(null, next ?? t);
 };
 
 part("play").addEventListener("click", () => play(!playing));

@@ -84,7 +84,7 @@ export class SolutionList {
     if (further.length) {
       const chips = further.map((row) => {
         const turns = names.map((name, k) => [name, row.q[k] - first.q[k]]).filter(([, turn]) => Math.abs(turn) > 1);
-        const texts = turns.map(([joint, turn]) => fill(words.turn, { joint, turn: signed(turn) }));
+        const texts = turns.map(([joint, turn]) => fill(words.turn, { joint, turn: `${turn > 0 ? "+" : ""}${inDegrees(turn, 0)}` }));
         return this.#button(row, [texts.join(", ")]);
       });
       item.append(element("p", "turns", `${words.other_turns} `, chips));
@@ -159,5 +159,3 @@ export function whyNot(data, { row, branch, miss }) {
 }
 
 const same = (a, b) => a.every((value, k) => Math.abs(value - b[k]) < SAME_ARM);
-
-const signed = (angle) => `${angle > 0 ? "+" : ""}${inDegrees(angle, 0)}`;

@@ -28,7 +28,6 @@ const FIELD = 1.9; // distance of the eye, in heights of the picture at the targ
 
 const pen = document.createElement("canvas").getContext("2d");
 const matrix = (T) => new three.Matrix4().set(...T.flat());
-const colourNamed = (css) => new three.Color(css);
 
 const GEOMETRIES = {
   box: ({ size }) => new three.BoxGeometry(...size),
@@ -109,7 +108,7 @@ export class Space extends Orbit {
     if (!this.materials.has(key)) {
       const through = pale ? { transparent: true, opacity: pale === true ? PALE : pale, depthWrite: marked } : {};
       const nearer = { polygonOffset: marked, polygonOffsetFactor: -1, polygonOffsetUnits: -4 };
-      this.materials.set(key, new three.MeshStandardMaterial({ color: colourNamed(css), roughness: 0.55, ...nearer, ...through }));
+      this.materials.set(key, new three.MeshStandardMaterial({ color: new three.Color(css), roughness: 0.55, ...nearer, ...through }));
     }
     return this.materials.get(key);
   }
@@ -274,7 +273,7 @@ export class Space extends Orbit {
     const key = `line ${css} ${width} ${hidden}`;
     if (!this.materials.has(key)) {
       const through = hidden ? { depthTest: false, transparent: true, opacity: HIDDEN } : {};
-      this.materials.set(key, new three.LineMaterial({ color: colourNamed(css), linewidth: width, ...through }));
+      this.materials.set(key, new three.LineMaterial({ color: new three.Color(css), linewidth: width, ...through }));
     }
     return this.materials.get(key);
   }

@@ -91,7 +91,7 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
     if fast:
         column, label, title = "speed_ratio", tr("speed / limit"), tr("Fastest joint")
     elif edge:
-        column, label, title = "elbow_deg", tr("elbow to singular (°)"), tr("Edge of the reach")
+        column, label = "elbow_deg", tr("elbow to edge of reach (°)")
     if before is not None:
         ax.plot(before.t_s, getattr(before, column), color=palette.MUTED, linestyle="--", label=tr("as programmed"))
         off = (rows.deviation_mm > OFF) | (rows.deviation_deg > OFF)
