@@ -369,11 +369,9 @@ def far_turns(path: MotionPath) -> list[Finding]:
     if turned[lead] > FAR_TURN and path.length < NEAR_MOVE:
         tool = forward(arm, path.q[[0, -1]])[:, :3, :3]
         if rotation_angle(tool[0], tool[1]) < turned[lead] / 2:
-            found.append(
-                fact(
-                    "joint_jumps", joint=lead + 1, angle_deg=float(np.degrees(step[lead])), moved_mm=path.length * 1000
-                )
-            )
+            angle, near, end = np.degrees([step[lead], *path.q[[0, -1], lead]]).tolist()
+            turned_deg = {"angle_deg": angle, "near_deg": near, "target_deg": end}
+            found.append(fact("joint_jumps", joint=lead + 1, moved_mm=path.length * 1000, **turned_deg))
     for j in np.flatnonzero(turned > np.pi).tolist():
         nearer = float(wrap_to_pi(step[j]))
         if abs(step[j]) - abs(nearer) > SPARED and arm.lower[j] <= start[j] + nearer <= arm.upper[j]:

@@ -75,7 +75,6 @@ REMEDIES: dict[str, str] = words(
         **dict.fromkeys(OUT_OF_REACH, NEARER),
         "later_out_of_reach": LATER,
         "configuration_ends": "End the line before that point: it does not lead on in this configuration.",
-        "joint_jumps": "Teach the target with this joint near to where it comes from.",
         "whole_turn": "Teach the target with the nearer angle, unless the turn is meant to unwind cables.",
         "arrives_otherwise": "Teach the target again where the line arrives.",
         "configuration_not_met": "Teach the target again, or correct its configuration.",
@@ -161,7 +160,8 @@ TEXTS = texts(
         "program_nothing_moves": "no instruction moves the arm",
         "load_above_payload": "{mass_kg:g} kg on the flange; payload {payload_kg:g} kg",
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
-        "remedy.limit": "Keep J{joint} within {limit:g}°; turn or move a target given as a pose.",
+        "remedy.limit": "Keep J{joint} within {limit_deg:g}°; turn or move a target given as a pose.",
+        "remedy.jump": "Teach the target with J{joint} near {near_deg:.0f}°, not at {target_deg:.0f}°.",
         "remedy.end": "End it at ({end_mm:.1f, }) mm: {margin_mm:.1f} mm clear.",
         "remedy.solid": (
             "[Add a via point around {name}: the target itself is clear.{there:!}][Move the target away from "
@@ -231,9 +231,9 @@ def _(found: Finding) -> str:
     return word("remedy", SINGULAR, found.type)
 
 
-@advises("above_limit", "below_limit")
+@advises("above_limit", "below_limit", "joint_jumps")
 def _(found: Finding) -> str:
-    return sentence("remedy.limit", joint=found.joint, limit=found.limit_deg)
+    return sentence("remedy.limit" if "limit_deg" in found.params else "remedy.jump", **found.params)
 
 
 @says("way_out_of_reach")

@@ -109,6 +109,7 @@ function draw() {
     for (const event of now) if ((event.status !== "caution") === grave) for (const name of event.bodies) colours.set(name, css);
   }
   const touching = new Set([...colours.keys()].filter((name) => colours.get(name) === data.colours.touching));
+  for (const [j, { status }] of failing()) colours.set(j, data.colours[status]);
   const poses = arms.map((arm, k) => posesOf(arm, valuesAt(motion.times, motion.values[k], t)));
   const { page } = space;
   if (space.target !== motion.target) Object.assign(space, { target: motion.target, distance: (space.distance * motion.length) / space.length, length: motion.length });
@@ -138,26 +139,26 @@ function draw() {
   const axes = (wrong ? [] : poses).flatMap((own) => [0, 1, 2].map((c) => [column(own.at(-1), 3), add(column(own.at(-1), 3), scaled(column(own.at(-1), c), 0.09 * data.size))]));
   axes.forEach((axis, i) => space.line(axis, data.axes[i % 3], 3));
   const worst = GRAVEST.find((status) => now.some((event) => event.status === status)); // what comes with it is not named
-  for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j]);
+  for (const j of new Set(now.flatMap(({ axes, status }) => (status === worst ? axes : [])))) singularAxis(j, poses[0][j], failing().has(j));
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   const [from, to] = poses.map((own) => column(own.at(-1), 3));
-  if (wrong) apart = `${fixed(1000 * Math.hypot(...subtract(from, to)), 0)} mm`;
-  if (wrong) marks.push({ from, to, text: apart });
+  if (wrong) marks.push({ from, to, text: (apart = `${fixed(1000 * Math.hypot(...subtract(from, to)), 0)} mm`) });
   if (wrong && from[2] < floor) space.word(words.through, from, page.touching);
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
   space.keepClear([...axes.flatMap(([a, b]) => [b, scaled(add(a, b), 0.5)]), motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
+  const css = touching.size || wrong ? page.touching : page.ink;
   for (const { from, to, text } of marks) {
-    const css = touching.size || wrong ? page.touching : page.ink;
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
-    else space.line([from, to], ...(text ? [css, 4] : [data.colours.sight, 1.5, false]));
-    if (text && String(from) !== String(to)) for (const end of [from, to]) space.dot(end, css, 4);
-    if (text) space.word(text, scaled(add(from, to), 0.5), css);
+    else space.line([from, to], text ? css : page.ink, text ? 4 : 2), text && [from, to].forEach((end) => space.dot(end, css, 4));
+    space.keepClear([0, 0.25, 0.5, 0.75, 1].map((part) => add(scaled(from, 1 - part), scaled(to, part))), 0);
   }
   if (motion.loads) tellLoads(poses[0]);
   for (const [j, { status }] of failing()) {
     if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
   }
   if (moves && arms.length === 1) nameEnds(motion.trails[0]);
+  space.keepClear(motion.trails[0], 0);
+  for (const { from, to, text } of marks) if (text) space.word(text, scaled(add(from, to), 0.5), css);
   data.signs.forEach(({ text, at }, k) => space.word(text, wrong ? column(poses[k][3], 3) : at, k === 0 && wrong ? page.touching : page.ink));
   space.names(surroundings, touching);
   space.end();
@@ -174,11 +175,11 @@ function sticks(poses, css, shown) {
   return off.length ? off.reduce((a, b) => (away(b) > away(a) ? b : a)) : [];
 }
 
-/** The axis of row `j`, whose frame is `T`, through the whole picture. */
-function singularAxis(j, T) {
+/** The axis of row `j`, whose frame is `T`, through the whole picture; with its name, unless the joint is named. */
+function singularAxis(j, T, named) {
   const [middle, way] = [moved(T, data.rows[j - 1].middle), scaled(column(T, 2), 0.3 * data.size)];
   space.line([subtract(middle, way), add(middle, way)], data.colours.caution, 2.5);
-  space.word(`J${j}`, add(middle, way), space.page.doubtful);
+  if (!named) space.word(`J${j}`, add(middle, way), space.page.doubtful);
 }
 
 /** What each joint bears now, as a bar of the most that any bears on this motion. */
@@ -212,7 +213,7 @@ function tell() {
   clock.textContent = said.replace("{t}", at).replace("{end}", last);
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
-  const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : apart ? words.apart.replace("{off}", apart) : motion.text;
+  const ends = playedUntil() < end() ? words.ends : apart ? words.apart.replace("{off}", apart) : motion.text;
   show(nowShown, (now[0]?.status === "plain" ? now.at(-1) : now[0])?.text || ends); // the first fault is the cause
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
@@ -220,7 +221,7 @@ function tell() {
   const on = stretches.filter(({ dataset }) => dataset.play === motion.name && isNow({ t: Number(dataset.from), until: Number(dataset.t) }));
   for (const part of stretches) {
     const now = part === on[0] || (on.includes(part) && part.dataset.from === part.dataset.t); // where two meet, the first; what has no motion too
-    if (now && !part.classList.contains("now")) listed(part);
+    if (now && !part.classList.contains("now")) listed(part), part.dataset.fix && dispatchEvent(new CustomEvent("advice", { detail: part }));
     part.classList.toggle("now", now);
   }
 }
@@ -332,10 +333,9 @@ function dock(edge = 0) {
 }
 
 const step = (sign) => {
-  const i = motion.times.findIndex((time) => time > t + 1e-9);
-  const before = motion.times.findLastIndex((time) => time < t - 1e-9);
+  const next = sign > 0 ? motion.times.find((time) => time > t + 1e-9) : motion.times.findLast((time) => time < t - 1e-9);
   play(false);
-  goTo(null, motion.times[sign > 0 ? (i < 0 ? motion.times.length - 1 : i) : Math.max(0, before)]);
+  goTo(null, next ?? t);
 };
 
 part("play").addEventListener("click", () => play(!playing));

@@ -19,7 +19,7 @@ from er3a.pipeline.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion, Weight
 from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at, stand
 from er3a.pipeline.viewing.page import packed_text, page_environment
-from er3a.pipeline.viewing.palette import DOUBTFUL, INK, REFERENCE, SOLUTIONS, TOUCHING
+from er3a.pipeline.viewing.palette import DOUBTFUL, INK, SOLUTIONS, TOUCHING
 from er3a.pipeline.viewing.still import (
     AZIMUTH,
     DISTANCE,
@@ -160,7 +160,7 @@ def _data(
         **arm,
         "others": [{"table": table_data(arm), **drawn_arm(arm)} for arm in beside],
         "signs": [{"text": text, "at": (at - [0, 0, 0.1 * size]).tolist()} for text, at in zip(signs, bases)],
-        "colours": {"sight": REFERENCE, "touching": TOUCHING, **COLOURS},
+        "colours": {"touching": TOUCHING, **COLOURS},
         "axes": AXES,
         "floor": floor,
         "solutions": SOLUTIONS,
@@ -250,7 +250,7 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
             picture.dot(np.array(mark.start), "ink", 5.0, rings=True)
             picture.word(mark.text, np.array(mark.start), "fail" if colours else "ink")
         elif mark.t0 <= t <= mark.t1:
-            picture.line(np.array([mark.start, mark.end]), INK if mark.text else REFERENCE, 1.5)
+            picture.line(np.array([mark.start, mark.end]), INK, 1.5)
     for shape in data["scene"]:
         if "pale" not in shape:
             picture.word(shape["name"], np.array(shape["T"])[:3, 3], "fail" if shape["name"] in colours else "ink")

@@ -19,7 +19,7 @@ function element(tag, className, text = "", parts = []) {
 export class SolutionList {
   /** `choose(q)` moves the arm; `ghost(q)` shows a pale one, null takes it away; `overlap(q)` says what collides. */
   constructor(data, arm, choose, ghost, overlap) {
-    Object.assign(this, { data, arm, choose, ghost, overlap });
+    Object.assign(this, { data, arm, choose, ghost, overlap, refused: byId("refused") });
     byId("previous").addEventListener("click", () => this.#step(-1));
     byId("next").addEventListener("click", () => this.#step(1));
   }
@@ -84,7 +84,7 @@ export class SolutionList {
     if (further.length) {
       const chips = further.map((row) => {
         const turns = names.map((name, k) => [name, row.q[k] - first.q[k]]).filter(([, turn]) => Math.abs(turn) > 1);
-        const texts = turns.map(([joint, turn]) => fill(words.turn, { joint, turn: signed(turn) }));
+        const texts = turns.map(([joint, turn]) => fill(words.turn, { joint, turn: `${turn > 0 ? "+" : ""}${inDegrees(turn, 0)}` }));
         return this.#button(row, [texts.join(", ")]);
       });
       item.append(element("p", "turns", `${words.other_turns} `, chips));
@@ -121,7 +121,8 @@ export class SolutionList {
     button.setAttribute("aria-disabled", String(!row.withinLimits));
     button.addEventListener("click", () => {
       if (row.withinLimits) this.choose(row.q);
-      write(byId("refused"), row.withinLimits ? "" : fill(this.data.words.not_moved, { reasons: beyondLimits(this.data, row.q).join(this.data.words.separator) }));
+      else button.after(this.refused);
+      write(this.refused, row.withinLimits ? "" : fill(this.data.words.not_moved, { reasons: beyondLimits(this.data, row.q).join(this.data.words.separator) }));
     });
     for (const event of ["pointerenter", "focus"]) button.addEventListener(event, () => this.ghost(row.q));
     for (const event of ["pointerleave", "blur"]) button.addEventListener(event, () => this.ghost(null));
@@ -132,7 +133,7 @@ export class SolutionList {
   #step(by) {
     const order = this.buttons.map((button) => Number(button.dataset.row)).filter((row) => this.rows[row].withinLimits);
     const at = order.indexOf(this.current);
-    write(byId("refused"), "");
+    write(this.refused, "");
     this.choose(this.rows[order[(at + by + order.length) % order.length]].q);
   }
 }
@@ -158,5 +159,3 @@ export function whyNot(data, { row, branch, miss }) {
 }
 
 const same = (a, b) => a.every((value, k) => Math.abs(value - b[k]) < SAME_ARM);
-
-const signed = (angle) => `${angle > 0 ? "+" : ""}${inDegrees(angle, 0)}`;

@@ -1,6 +1,6 @@
 /** The picture of the arm: what is drawn at given joint angles. */
 
-import { add, column, moved, scaled, turned } from "er3a/algebra";
+import { add, column, moved, scaled } from "er3a/algebra";
 import { frames, tableFrames } from "er3a/kinematics";
 import { alongArm, Arm, ARM, Space, WORLD } from "er3a/space";
 
@@ -33,10 +33,10 @@ export class ArmView extends Space {
     const hiding = this.hiding(this.surroundings, poses);
     this.place(this.surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) || mesh.shape.large);
     this.keepClear(alongArm(poses), ARM * reach);
-    if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
-    else this.#axes(poses);
     this.#frame(poses.at(-1), 0.11, ["x", "y", "z"]);
     if (nearest?.text) this.#nearest(nearest);
+    if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
+    else this.#axes(poses);
     this.names(this.surroundings, touching);
     this.end();
   }
@@ -50,6 +50,7 @@ export class ArmView extends Space {
     const { data, page } = this;
     this.line([from, to], touching.length ? data.colours.touching : page.ink, 3);
     for (const end of [from, to]) this.dot(end, touching.length ? page.touching : page.ink, 4, touching.length > 0);
+    this.keepClear([0, 0.25, 0.5, 0.75, 1].map((part) => add(scaled(from, 1 - part), scaled(to, part))), 0);
     this.word(text, scaled(add(from, to), 0.5), touching.length ? page.touching : page.ink);
   }
 
@@ -76,11 +77,9 @@ export class ArmView extends Space {
 
   /** A frame's axes, `part` of the arm's size long. */
   #frame(T, part, names = []) {
-    this.data.axes.forEach((colour, c) => {
-      const arrow = [0, 1, 2].map((i) => (i === c ? part * this.reach : 0));
-      const tip = add(column(T, 3), turned(T, arrow));
-      this.line([column(T, 3), tip], colour, 3);
-      if (names[c]) this.word(names[c], tip, colour);
-    });
+    const [origin, ...tips] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map((arrow) => moved(T, scaled(arrow, part * this.reach)));
+    for (const [c, tip] of tips.entries()) this.line([origin, tip], this.data.axes[c], 3);
+    for (const tip of names.length ? tips : []) this.keepClear([tip, scaled(add(origin, tip), 0.5)], 0.015 * this.reach);
+    for (const [c, name] of names.entries()) this.word(name, tips[c], this.data.axes[c]);
   }
 }

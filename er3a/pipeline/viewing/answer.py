@@ -9,8 +9,8 @@ from typing import Literal
 from er3a.pipeline.language import tr
 
 Mark = Literal["pass", "caution", "fail", "conflict", "no_reference", "no_verdict", "none"]
-PartMark = Literal["pass", "caution", "fail", "none", "rest"]
-"""Of a stretch of a bar; ``rest`` is what the bar leaves empty."""
+PartMark = Literal["pass", "caution", "fail", "none", "rest", "zero"]
+"""Of a stretch of a bar; ``rest`` is what the bar leaves empty, ``zero`` a line at its start."""
 NARROWEST = 0.04  # of a bar, at which a moment is still seen
 
 

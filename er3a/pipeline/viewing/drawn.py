@@ -139,7 +139,7 @@ def _joint(k: int, along: Reals, radius: float) -> list[Shape]:
     T, mark = np.eye(4), np.eye(4)
     T[:3, 3] = mark[:3, 3] = along / 2
     mark[0, 3] = wide / 2
-    common = {"frame": k + 1, "name": link_label(k + 1)}
+    common = {"frame": k + 1, "name": link_label(k + 1), "joint": k + 1}
     size = [1.02 * wide, 0.16 * wide, 2.04 * half]
     return [
         {**common, "kind": "cylinder", "T": T.tolist(), "radius": wide, "length": 2 * half, "colour": JOINTS[k]},

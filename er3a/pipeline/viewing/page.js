@@ -708,16 +708,17 @@ document.querySelector("nav [aria-current]")?.scrollIntoView({ inline: "center",
 // The row of the list whose moment or picture is shown.
 const rows = [...document.querySelectorAll(".runs:not(.plain) a[href]")];
 const fix = rows.some((row) => row.dataset.fix) && document.querySelector(".hero .fix"); // it follows the row
-const mark = (shown) => {
+const mark = (shown, part = shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
-  if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
-  const { lead, fix: advice, instead } = shown.dataset;
+  if (!fix || fix.toggleAttribute("hidden", !part?.dataset.fix)) return;
+  const { lead, fix: advice, instead } = part.dataset;
   fix.querySelector("b").textContent = lead;
   fix.querySelector("span").lastChild.data = ` ${advice}`;
   const link = fix.querySelector("a");
   if (instead) [link.href, link.textContent] = [instead, instead.includes("until=") ? WORDS.playUpTo : WORDS.show];
   link.hidden = !instead || (link.hash === shown.hash && !instead.includes("?")); // nothing else is there to be shown
 };
+addEventListener("advice", ({ detail }) => mark(rows.find((row) => row.ariaCurrent), detail)); // of a part of the row's motion
 // Several rows may show one motion, each another moment of it.
 const other = (row) => new URLSearchParams(row.dataset.instead?.split(/[?#]/)[1]).get("play"); // that it leads to instead
 const playing = (name, t) => rows.find((row) => row.dataset.play === name && row.dataset.t === t) ?? rows.find((row) => row.dataset.play === name) ?? rows.find((row) => name && other(row) === name);

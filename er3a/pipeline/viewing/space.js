@@ -28,7 +28,6 @@ const FIELD = 1.9; // distance of the eye, in heights of the picture at the targ
 
 const pen = document.createElement("canvas").getContext("2d");
 const matrix = (T) => new three.Matrix4().set(...T.flat());
-const colourNamed = (css) => new three.Color(css);
 
 const GEOMETRIES = {
   box: ({ size }) => new three.BoxGeometry(...size),
@@ -95,8 +94,9 @@ export class Space extends Orbit {
       mesh.matrix.multiplyMatrices(matrix(poses[Math.min(shape.frame, poses.length - 1)]), local);
       mesh.updateMatrixWorld(true);
       const through = shape.pale || pale(mesh);
-      const marked = !shape.pale && colours.has(shape.name); // a floor is not red all over
-      mesh.material = this.material(marked ? colours.get(shape.name) : shape.pale ? (shape.own ?? this.page.grid) : shape.colour, through, marked);
+      const css = colours.get(shape.kind === "cylinder" ? shape.joint : null) ?? colours.get(shape.name);
+      const marked = !shape.pale && Boolean(css); // a floor is not red all over
+      mesh.material = this.material(marked ? css : shape.pale ? (shape.own ?? this.page.grid) : shape.colour, through, marked);
       mesh.castShadow = !through;
       mesh.visible = true;
     }
@@ -108,7 +108,7 @@ export class Space extends Orbit {
     if (!this.materials.has(key)) {
       const through = pale ? { transparent: true, opacity: pale === true ? PALE : pale, depthWrite: marked } : {};
       const nearer = { polygonOffset: marked, polygonOffsetFactor: -1, polygonOffsetUnits: -4 };
-      this.materials.set(key, new three.MeshStandardMaterial({ color: colourNamed(css), roughness: 0.55, ...nearer, ...through }));
+      this.materials.set(key, new three.MeshStandardMaterial({ color: new three.Color(css), roughness: 0.55, ...nearer, ...through }));
     }
     return this.materials.get(key);
   }
@@ -204,6 +204,7 @@ export class Space extends Orbit {
   dot(point, css, radius, ring = false) {
     const [cx, cy] = this.seen(point);
     this.#svg("circle", { cx, cy, r: radius, fill: css, stroke: this.page.halo, "stroke-width": 1.5 });
+    if (ring) this.taken.push([cx, cy, 8 * radius, 8 * radius]);
     for (const share of ring ? [2.4, 4] : []) this.#svg("circle", { cx, cy, r: share * radius, fill: "none", stroke: css, "stroke-width": 4 / share });
   }
 
@@ -272,7 +273,7 @@ export class Space extends Orbit {
     const key = `line ${css} ${width} ${hidden}`;
     if (!this.materials.has(key)) {
       const through = hidden ? { depthTest: false, transparent: true, opacity: HIDDEN } : {};
-      this.materials.set(key, new three.LineMaterial({ color: colourNamed(css), linewidth: width, ...through }));
+      this.materials.set(key, new three.LineMaterial({ color: new three.Color(css), linewidth: width, ...through }));
     }
     return this.materials.get(key);
   }

@@ -273,7 +273,9 @@ def last_safe_stop(task: MotionTask, motion: Motion, found: Judgement, margin: f
         return None
     end = np.array([last.begin])
     pose, q = motion.tool(end)[0], motion.joints(np.append(end, found.along.contacts[0].start))
-    touching = task.bodies.surface_points(q[1], int(task.bodies.min_distance(q[1:])[1][0])).mean(axis=0)
+    first = np.array([k for k, pair in enumerate(task.bodies.pairs) if pair == found.along.contacts[0].pairs[0]])
+    nearest = first[task.bodies.distances(q[1], first).argmin()]
+    touching = task.bodies.surface_points(q[1], int(nearest)).mean(axis=0)
     return model.ClearUntil(
         1000 * last.margin,
         last.begin,

@@ -22,7 +22,7 @@ from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.stages.trajectory.page.played import faults, safe_end
 from er3a.pipeline.stages.workspace.page.tray import found_by
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, all_caught
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part, PartMark, all_caught
 from er3a.pipeline.viewing.page import render_stage
 from er3a.robots.robot import Robot
 
@@ -80,10 +80,12 @@ def _answer(
     """
     params = summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
-    most = max((abs(each.clearance_mm) for each in closest), default=1.0) or 1.0
-    rows = [_row(each, unreached, near, known.get(each.name), most) for each in closest]
+    ends = [0.0, *(each.clearance_mm for each in closest)]
+    span = min(ends), max(ends)
+    rows = [_row(each, unreached, near, known.get(each.name), span) for each in closest]
     hit, clear, partly = (
-        [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
+        [row for row in rows if row.mark in marks]
+        for marks in (("fail",), ("pass", "caution", "no_reference"), ("none",))
     )
     counted = (
         (N_("{count} paths can't be reached whole."), len(partly)),
@@ -119,12 +121,10 @@ def _row(
     unreached: set[str],
     near: Sequence[str],
     fault: Fault | None,
-    most_mm: float,
+    span_mm: tuple[float, float],
 ) -> ListRow:
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
-    which only a part was measured.
-
-    The bar is the clearance, or the depth of an overlap, in parts of ``most_mm``."""
+    which only a part was measured; ``span_mm``: of the whole bar, on which an overlap is left of 0."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     of_path = found.kind == "path"
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
@@ -133,9 +133,12 @@ def _row(
     fault = fault if of_path else None
     if fault and mark == "pass":
         note = tr("{far} mm; Paths: {verdict}", far=fixed(found.clearance_mm, 1), verdict=fault.verdict)
+        mark = "no_reference"
     fix = fix_of([fault]) if fault and fault.instead and mark == "fail" else None
-    length = abs(found.clearance_mm) / most_mm
-    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, fix=fix)
+    zero, end = np.interp([0.0, found.clearance_mm], span_mm, [0.0, 1.0])
+    own: PartMark = "fail" if mark == "fail" else "none" if mark == "none" else "pass"
+    parts = [Part(0.0, 1.0, "rest"), Part(min(zero, end), max(zero, end), own), Part(zero, zero, "zero")]
+    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), 1.0, parts, fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

@@ -65,7 +65,9 @@ def _solution_event(rows: SolutionRows, k: int) -> PlayedEvent:
     refusal, name = rows.refusal[k], branch_word(rows.label[k], int(rows.branch[k]))
     said = tr("chosen") if rows.rank[k] == 1 else refusal_in_short(refusal)
     weight: Weight = "fail" if refusal is not None else "caution" if rows.singular[k].any() else "plain"
-    return PlayedEvent(k, k + SHOWN_S, with_singularity(joined([name, said], ": "), rows, k), weight)
+    over = refusal.joints if refusal and is_one(refusal, "limits_exceeded") else ()
+    joints = tuple((each.joint, "") for each in over)
+    return PlayedEvent(k, k + SHOWN_S, with_singularity(joined([name, said], ": "), rows, k), weight, joints=joints)
 
 
 def with_singularity(said: str, rows: SolutionRows, k: int) -> str:

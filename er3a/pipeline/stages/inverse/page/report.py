@@ -118,11 +118,15 @@ def _row(target: model.TargetResult) -> ListRow:
         mark = "caution" if _singular(target) else "pass"
     fix = None
     if target.chosen_deg:
-        fix = Fix(tr("jog from there in the teach panel."), panel_address(target.chosen_deg), instead=False)
+        fix = _jogged(target.chosen_deg)
     elif target.advice and mark == "fail":
         seen = address_of("inverse", target.name, 1.0, target.name) if near and near.shifted_to_mm else ""
         fix = Fix(say(target.advice[-1]), seen)
     return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
+
+
+def _jogged(q_deg: Iterable[float]) -> Fix:
+    return Fix(tr("jog from there in the teach panel."), panel_address(q_deg), instead=False)
 
 
 def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> dict[str, Any]:
@@ -133,6 +137,7 @@ def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows)
         position=_listed(target.xyz_mm),
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),
+        start=_joints(target.q_ref_deg) if any(target.q_ref_deg) else tr("zero"),
         reason=say(target.reason),
         short=_row(target).note,
         clearance=_clearance(target),
@@ -141,23 +146,27 @@ def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows)
         method="" if is_one(target.method, "closed_form") else say(target.method),
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
-        listed=_solutions_listed(robot, target.name, branches),
+        listed=_solutions_listed(robot, target, branches),
     )
 
 
 def _solutions_listed(
-    robot: Robot, target: str, branches: model.SolutionRows
-) -> list[tuple[str, Markup, Markup, Sequence[float], str]]:
-    """The branches as they are listed by the player: mark, where it shows each, its name, where each joint is between
-    its limits (0 to 1), and how far the joints move."""
+    robot: Robot, target: model.TargetResult, branches: model.SolutionRows
+) -> list[tuple[str, Markup, Fix | None, Markup, Sequence[float], str]]:
+    """The branches as they are listed by the player: mark, where it shows each, what to do then, its name, where each
+    joint is between its limits (0 to 1), and how far the joints move."""
     singular = np.asarray(branches.singular.any(axis=1))
     ways = np.where(robot.upper - robot.lower < np.inf, robot.upper - robot.lower, 1.0)
+    count = (branches.rank > 0).sum()
+    used = tr("use solution {which}.", which=f"1–{count}" if count > 1 else 1)
+    instead = Fix(used, address_of("inverse", target.name, 0.0, target.name)) if target.chosen_deg else None
     shares = np.where(ways == 1.0, 0.5, (meant(robot, branches.q_deg) - robot.lower) / ways)
     return [
         (
             "fail" if branches.refusal[k] else "caution" if singular[k] else "pass",
-            stretch(target, k, k + SHOWN_S),
-            moment(target, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
+            stretch(target.name, k, k + SHOWN_S),
+            instead if branches.refusal[k] else _jogged(branches.q_deg[k]),
+            moment(target.name, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
             shares[k].clip(-OVER, 1 + OVER).tolist(),
             _outcome(branches, k, _move(branches, k)),
         )
@@ -183,10 +192,8 @@ def _clearance(target: model.TargetResult) -> str:
 
 
 def _branch_rows(branches: model.SolutionRows) -> list[list[str]]:
-    ranks = branches.rank[branches.rank > 0]
     cells = []
     for k in range(len(branches)):
-        place = int((ranks <= branches.rank[k]).sum())
         cells.append(
             [
                 panel_link(branches.q_deg[k], _on_one_line(branches.label[k], int(branches.branch[k]))),
@@ -194,7 +201,7 @@ def _branch_rows(branches: model.SolutionRows) -> list[list[str]]:
                 fixed(branches.limit_margin_deg[k], 1),
                 fixed(branches.manipulability[k], 3),
                 fixed(branches.greatest_move_deg[k], 1),
-                _outcome(branches, k, tr("chosen") if place == 1 else tr("choice {place}", place=place)),
+                _outcome(branches, k, tr("choice {place}", place=k + 1) if k else tr("chosen")),
             ]
         )
     return cells

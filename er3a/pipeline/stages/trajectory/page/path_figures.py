@@ -63,7 +63,7 @@ def nearness_picture(
     if shapes:
         margin = shapes.margin_mm
         text = tr("assumed shapes may be off by {mm:g} mm", mm=margin)
-        ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.25, linewidth=0, label=text)
+        ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.45, linewidth=0, label=text)
     _key(ax)
     ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
     far = fixed(least.least_mm, 1)
@@ -76,7 +76,7 @@ def nearness_picture(
 
 def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.PathChecks | None = None) -> Picture:
     """What fails on a path that meets nothing, over the time of a motion: the speed of its fastest joint in parts of
-    the limit, or else how far it is from singular poses.
+    the limit; of a path that ends where the elbow does, how far that is; or else how far it is from singular poses.
 
     Parameters
     ----------
@@ -86,7 +86,12 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
     """
     figure, ax = new_figure(width=5.2, height=3.0)
     fast = path.too_fast and path.verdict != "singular" and not path.unreachable
-    column = "speed_ratio" if fast else "smallest_singular_value"
+    edge = before is None and path.unreachable and any(each.type == "elbow" for each in path.singularities)
+    column, label, title = "smallest_singular_value", tr("smallest singular value"), tr("Distance from singular poses")
+    if fast:
+        column, label, title = "speed_ratio", tr("speed / limit"), tr("Fastest joint")
+    elif edge:
+        column, label = "elbow_deg", tr("elbow to edge of reach (°)")
     if before is not None:
         ax.plot(before.t_s, getattr(before, column), color=palette.MUTED, linestyle="--", label=tr("as programmed"))
         off = (rows.deviation_mm > OFF) | (rows.deviation_deg > OFF)
@@ -103,14 +108,13 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
     else:
         _mark(ax, path)
     _key(ax)
-    ax.plot(rows.t_s, getattr(rows, column), color=palette.MODEL, linewidth=2.2)
+    ax.plot(rows.t_s, abs(getattr(rows, column)), color=palette.MODEL, linewidth=2.2)
     if fast:
         ax.axhline(1.0, color=palette.TOUCHING, linewidth=1.2)
     ax.set_ylim(bottom=0.0)
     ax.set_xlim(0.0, rows.t_s[-1])
     ax.set_xlabel(axis_label(rows, "t_s"))
-    ax.set_ylabel(tr("speed / limit") if fast else tr("smallest singular value"))
-    title = tr("Fastest joint") if fast else tr("Distance from singular poses")
+    ax.set_ylabel(label)
     crosses = before is not None and not fast and path.strategy == "detour"
     return Picture(figure, title, tr("A joint move may cross the singular pose.") if crosses else "", [(ax, name)])
 

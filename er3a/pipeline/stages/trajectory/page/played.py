@@ -42,6 +42,7 @@ from er3a.robots.robot import Robot
 SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
 LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
 MIN_LENGTH = 1e-6  # m
+DASHES = 3  # of the rest of a path that the arm does not reach
 SINGULAR_AXES = {"wrist": (4, 6), "elbow": (2, 3), "shoulder": (1,)}  # rows of the table that such a pose is of
 RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
 
@@ -59,18 +60,16 @@ def motions(
 
     checks, avoidance, motions = results.checks, results.avoidance, []
     for path in worst_first(results.summary.paths):
-        rows = checks.take((checks.path == path.name) & checks.reachable)
+        whole = checks.take(checks.path == path.name)
+        rows = whole.take(whole.reachable)
         near = near_assumed(path, results.summary)
         text = say(near) if near else path_text(path)
         seen = [*events(path), *_near_events(path, near, results.clearance), *added(path.name)]
         if path.verdict == "safe" and not near:
             seen += _nearest(path.clearance)
         seen += safe_end(path, results.clearance)
-        motions.append(
-            PlayedMotion(
-                path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path), whole_s=path.duration_s
-            )
-        )
+        marks, q = [*contact(path), *_beyond(path, whole)], meant(robot, rows.q_deg)
+        motions.append(PlayedMotion(path.name, text, rows.t_s, q, seen, marks, whole_s=path.duration_s))
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
             text = repair_lead(path, slowed(path, rows, repair))
@@ -351,6 +350,15 @@ def contact(path: model.PathSummary) -> list[Mark]:
         return []
     x, y, z = (value / 1000 for value in path.clear_until.contact_mm)
     return [Mark(part.t0_s, part.t1_s, (x, y, z), (x, y, z), tr("first contact")) for part in path.collisions[:1]]
+
+
+def _beyond(path: model.PathSummary, rows: model.PathChecks) -> list[Mark]:
+    """The rest of a path that ends beyond the reach, dashed, and how far beyond it ends; ``rows``: of the path."""
+    if not path.unreachable or rows.reachable[-1]:
+        return []
+    at = np.linspace(np.flatnonzero(rows.reachable).max(initial=0), len(rows) - 1, 2 * DASHES + 1).astype(int)
+    points, said = (rows.xyz_mm[at] / 1000).tolist(), [*[""] * (DASHES - 1), _few_words(path.unreachable[-1])]
+    return [Mark(0.0, path.duration_s, *ends) for ends in zip(points[1::2], points[2::2], said)]
 
 
 def _touching(cause: object) -> tuple[str, ...]:

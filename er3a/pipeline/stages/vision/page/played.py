@@ -17,8 +17,8 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.vision.model import CIRCLES_MM, ObjectResult, PoseEstimate, VisionResults, VisionSummary
-from er3a.pipeline.viewing.drawn import Shape
-from er3a.pipeline.viewing.palette import REFERENCE, VERDICTS
+from er3a.pipeline.viewing.drawn import Shape, frame_between
+from er3a.pipeline.viewing.palette import INK, REFERENCE, VERDICTS
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -26,15 +26,15 @@ WAYS = {"move": N_("move to the approach"), "approach": N_("straight to the gras
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
 ROUND_M = {"radius": 0.02, "length": 0.06}
 SIGHT = 0.2  # of the farthest distance, how far the pyramid of a camera reaches that moves with the arm
-PALE = 0.1  # opacity of the pyramid
+PALE, EDGE = 0.06, 0.5  # opacity of the pyramid's foot, and of its edges
+EDGE_M = 0.0015  # radius
 CAMERA_M = (0.09, 0.07, 0.07)
-SIDES = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1], [1, 3, 2], [1, 4, 3]]  # of a pyramid, its top first
-CONE = [*SIDES, *(side[::-1] for side in SIDES)]  # seen from both sides
+EDGES = ((0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1))  # of a pyramid, its top first
+FOOT = [[1, 2, 3], [1, 3, 4], [3, 2, 1], [4, 3, 1]]  # seen from both sides
 
 
 def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[PlayedMotion]:
-    """The way to each object and away from it, with the arm before the approach drawn pale; the arm where it waits for
-    an object that it does not grasp."""
+    """The way to each object and away from it; the arm where it waits for an object that it does not grasp."""
     home, objects = meant(robot, np.array(task.home_deg)), results.summary.objects
     moved = [_moved(robot, each) for each in objects if each.moved_to_mm]
     return [*(_motion(robot, results, each, home) for each in objects), *moved]
@@ -77,8 +77,7 @@ def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Real
     parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
     events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
     text = tr("{grasp}, turned by {turn}°", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
-    ghost = meant(robot, np.array(each.grasp.q_before_deg))
-    return PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events, ghosts=[ghost])
+    return PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events)
 
 
 def refusal_text(each: ObjectResult) -> str:
@@ -99,7 +98,7 @@ def placed(pose: PoseEstimate | ObjectResult) -> Reals:
 
 
 def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[Shape]:
-    """The camera with the cone of what it sees, and a box at each object, or a cylinder where it looks the same at any
+    """The camera with the edges of what it sees, and a box at each object, or a cylinder where it looks the same at any
     angle; a camera on the arm moves with it.
 
     Returns
@@ -119,8 +118,12 @@ def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[
     if fixed_camera:
         corners = _down(T, _corners(task, task.view.farthest_mm / 1000), summary)
     points = np.concatenate([np.zeros((1, 3)), corners])
-    cone = {"kind": "mesh", "points": points.tolist(), "faces": CONE, "pale": PALE, "own": REFERENCE}
-    return [*shapes, {**common, "kind": "box", "size": CAMERA_M}, {**common, **cone}]
+    sight = [{"kind": "mesh", "points": points.tolist(), "faces": FOOT, "pale": PALE}]
+    for i, j in EDGES:
+        edge, length = T @ frame_between(points[i], points[j]), float(np.linalg.norm(points[i] - points[j]))
+        sight.append({"kind": "cylinder", "T": edge.tolist(), "radius": EDGE_M, "length": length, "pale": EDGE})
+    seen = [{**common, "own": REFERENCE, **each} for each in sight]
+    return [*shapes, {**common, "kind": "box", "size": CAMERA_M}, *seen]
 
 
 def _corners(task: VisionFile, far: float) -> Reals:
@@ -143,5 +146,5 @@ def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:
 
 
 def _object(each: ObjectResult, kind: str) -> Shape:
-    colour, T = VERDICTS["pass" if each.grasp else "fail"], placed(each).tolist()
+    colour, T = VERDICTS["pass"] if each.grasp else INK, placed(each).tolist()  # not red: what it touches is
     return {"frame": 0, "name": each.name, "kind": kind, "T": T, "colour": colour, "size": OBJECT_M, **ROUND_M}
