@@ -8,10 +8,11 @@ import numpy as np
 import rerun as rr
 
 from er3a.kinematics.forward import skeleton
-from er3a.pipeline.messages.kinematics import say
+from er3a.pipeline.messages.kinematics import branch_word, say
 from er3a.pipeline.messages.say import listed
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, TargetResult, shown_targets
+from er3a.pipeline.stages.inverse.page.played import refusal_in_short
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
@@ -70,7 +71,7 @@ def _run(robot: Robot, target: TargetResult, branches: SolutionRows) -> Run:
         shapes[f"{root}/branch_{branch}"] = rr.LineStrips3D([points], radii=width * size, colors=[rgb(colour)])
     return Run(
         name=target.name,
-        text=_about(target),
+        text=_about(target, branches),
         t=np.zeros(1),
         q=meant(robot, np.array([target.chosen_deg or target.q_ref_deg])),
         outcome="taken" if target.chosen_deg is not None else "none taken",
@@ -79,9 +80,22 @@ def _run(robot: Robot, target: TargetResult, branches: SolutionRows) -> Run:
     )
 
 
-def _about(target: TargetResult) -> str:
+def _about(target: TargetResult, branches: SolutionRows) -> str:
     lines = [f"# {target.name}", escaped(target.note or "")]
     verdict = "Taken" if target.chosen_deg is not None else "None taken"
     lines.append(f"**{verdict}:** {say(target.reason)}.")
     lines += listed(target.advice)
+    if len(branches):
+        rows = [
+            f"| {branches.branch[k]} | {branch_word(branches.label[k], int(branches.branch[k]))} | "
+            f"{_outcome(branches, k)} |"
+            for k in np.argsort(branches.branch, kind="stable")
+        ]
+        lines.append("\n".join(["| no. | branch | outcome (°) |", "|---|---|---|", *rows]))
     return "\n\n".join(line for line in lines if line)
+
+
+def _outcome(branches: SolutionRows, k: int) -> str:
+    if branches.refusal[k] is not None:
+        return refusal_in_short(branches.refusal[k])
+    return "taken" if branches.rank[k] == 1 else "within limits"

@@ -11,10 +11,11 @@ import rerun as rr
 
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.programs import cycle_text, level_word
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults, ProgramSummary
-from er3a.pipeline.stages.programs.page.played import WEIGHTS, motions, stretches, worst_first
+from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
+from er3a.pipeline.stages.programs.page.played import WEIGHTS, motions, of_line, stretches, worst_first
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.palette import VERDICTS, rgb
 from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
@@ -58,7 +59,7 @@ def _run(results: ProgramsResults, program: ProgramSummary, motion: PlayedMotion
     outcome = "passes in the model" if program.outcome == "pass" else outcome_word(program.outcome)
     texts, lines = [], []
     for line, level, t0, _ in stretches(rows):
-        texts.append((t0, _document(program, line, listing, level)))
+        texts.append((t0, _document(program, line, listing, of_line(program, line), level)))
         lines.append((t0, f"{program.name}:{line}", WEIGHTS[level]))
     return Run(
         name=program.name,
@@ -83,9 +84,12 @@ def _way(rows: ProgramMotion) -> Logged:
     return rr.LineStrips3D([points for _, points in parts], colors=colours, radii=0.004)
 
 
-def _document(program: ProgramSummary, line: int, texts: Sequence[str], level: Level) -> str:
+def _document(
+    program: ProgramSummary, line: int, texts: Sequence[str], found: Sequence[FindingAt], level: Level
+) -> str:
     first, last = max(line - AROUND, 1), min(line + AROUND, len(texts))
     listing = [
         f"{'▶' if n == line else ' '}{n:>5}  {texts[n - 1]}".replace("```", "'''") for n in range(first, last + 1)
     ]
-    return "\n".join([f"## {program.name}, line {line}: {level_word(level)}", "```", *listing, "```"])
+    remarks = [f"- {escaped(say(each.finding))}" for each in found]
+    return "\n".join([f"## {program.name}, line {line}: {level_word(level)}", "```", *listing, "```", *remarks])

@@ -34,7 +34,7 @@ are a fault.
 
 - orange pyramid: what the camera sees; a double click on it looks through
 - blue dots and arrows: samples that the calibration rests on; magenta: samples left out
-- boxes with axes: the objects, as the camera places them, red those that are not grasped
+- boxes with axes: the objects, as the camera places them, red those that are not grasped; balls: 95 % of errors
 - sand: the scene
 
 Press play: the arm goes through the samples, then to each object that it can grasp, and away.
@@ -113,15 +113,23 @@ def _object(each: ObjectResult, size: float) -> dict[str, Logged]:
     colour, entity = rgb(VERDICTS["pass" if each.grasp else "fail"]), f"objects/{each.name}"
     box = rr.Boxes3D(sizes=[OBJECT_M], colors=[colour], labels=[each.name], show_labels=True)
     axes = rr.Arrows3D(vectors=0.07 * size * np.eye(3), colors=AXES, radii=0.002)
-    return {entity: [_at(placed(each)), box], f"{entity}/axes": axes}
+    shapes: dict[str, Logged] = {entity: [_at(placed(each)), box], f"{entity}/axes": axes}
+    if each.error_mm:
+        shapes[f"{entity}/error"] = rr.Ellipsoids3D(radii=[each.error_mm.together / 1000], colors=[rgb(HIGHLIGHT)])
+    return shapes
 
 
 def _sampled(robot: Robot, rows: SampleRows, home: Reals) -> Run:
     """Samples half a second each."""
     poses = np.flatnonzero(np.isfinite(rows.q_deg).all(axis=1)) if len(rows) else np.empty(0, dtype=int)
     times = SAMPLE_S * np.arange(len(poses) + 1, dtype=float)
+
+    texts = []
+    for t, k in zip(times[1:].tolist(), poses):
+        used, residual = "used" if rows.used[k] else "**left out**", np.linalg.norm(rows.residual_mm[k])
+        texts.append((t, f"Sample {escaped(rows.sample[k])}, {used}: residual {residual:.3g} mm"))
     q = np.concatenate([home[None], meant(robot, rows.q_deg[poses])]) if len(poses) else home[None]
-    return Run("samples", "The arm goes through the samples.", times, q, pause_s=SAMPLE_S)
+    return Run("samples", "The arm waits.", times, q, texts=texts, pause_s=SAMPLE_S)
 
 
 def _grasped(robot: Robot, results: VisionResults, each: ObjectResult, home: Reals) -> Run:
