@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from er3a.by_value import frozen
 from er3a.files.kept_files import write_text
 from er3a.finding import is_one
 from er3a.pipeline.code_digest import code_digest
@@ -36,7 +37,7 @@ Results = Mapping[str, Stored[Any]]
 """The results of a robot's stages that are there, by stage."""
 
 
-@dataclass(frozen=True)
+@frozen
 class StageCell:
     """A stage of a robot: its verdict, its number, what is to be known of that in few words, and the whole sentence."""
 
@@ -47,7 +48,7 @@ class StageCell:
     text: str = ""
 
 
-@dataclass(frozen=True)
+@frozen
 class RobotRow:
     """A robot on the index.
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from er3a.by_value import frozen
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.dynamics import payload_key
 from er3a.pipeline.messages.say import joined
@@ -28,7 +28,7 @@ FEW = 4  # rows of a tile: so many are seen whole on the first screen
 LETTERS = 0.14  # of the reach, in the small view from above
 
 
-@dataclass(frozen=True)
+@frozen
 class Tile:
     """An answer, which leads to its page, and its picture.
 

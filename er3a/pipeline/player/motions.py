@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 from urllib.parse import urlencode
 
 import numpy as np
 
+from er3a.by_value import by_identity, frozen
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import first_sentence
 from er3a.pipeline.viewing.answer import Fix, ListRow, Part
@@ -18,7 +19,7 @@ from er3a.robots.robot import Robot
 Weight = Literal["plain", "caution", "fail"]
 
 
-@dataclass(frozen=True)
+@frozen
 class PlayedEvent:
     """Something to be seen from ``t`` to ``until`` (s); ``status`` (``plain``, ``caution``, ``fail``) colours it.
 
@@ -35,7 +36,7 @@ class PlayedEvent:
     axes: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True)
+@frozen
 class Mark:
     """A line between two points (m), a dot where they are one, with a word, shown from ``t0`` to ``t1`` (s)."""
 
@@ -46,7 +47,7 @@ class Mark:
     text: str
 
 
-@dataclass(frozen=True)
+@frozen
 class FaultMoment:
     """One thing that is wrong: ``when``, or in which line, and ``place``, how far along and where the tool point is
     then; both empty where not known. ``seen_s``: when the player shows it best, at ``address`` on the robot's pages;
@@ -60,7 +61,7 @@ class FaultMoment:
     address: str = ""
 
 
-@dataclass(frozen=True)
+@frozen
 class Fault:
     """Why a path or a program may not be run as it is, and what to do instead.
 
@@ -89,7 +90,7 @@ def address_of(page: str, motion: str, t: float, place: str, until: float | None
     return f"{page}.html?{urlencode({'play': motion, 't': round(t, 9), **end})}#{place}"
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class PlayedMotion:
     """A motion of the arm.
 

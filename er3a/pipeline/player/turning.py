@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from er3a.by_value import by_identity
 from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import own_title, tr
@@ -24,7 +24,7 @@ _HERE = Path(__file__).parent
 STEPS = 65_535  # that the box around everything is divided into
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Layer:
     """Something of a figure in space that can be shown or left out.
 
@@ -46,7 +46,7 @@ class Layer:
     address: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Solids:
     """Shapes of ``viewing/drawn.py`` under one name, which can be left out: an arm in one pose, or a scene.
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
+from er3a.by_value import frozen
 from er3a.pipeline.language import tr
 
 Mark = Literal["pass", "caution", "fail", "conflict", "no_reference", "no_verdict", "none"]
@@ -14,7 +14,7 @@ PartMark = Literal["pass", "caution", "fail", "none", "rest", "zero"]
 NARROWEST = 0.04  # of a bar, at which a moment is still seen
 
 
-@dataclass(frozen=True)
+@frozen
 class Part:
     """A stretch of a bar, from ``start`` to ``end`` in parts of the row's own length, in the colour of a mark, or in
     a ``colour`` of its own (``#rrggbb``)."""
@@ -35,7 +35,7 @@ class Part:
         return 100 * max(self.end - self.start, NARROWEST)
 
 
-@dataclass(frozen=True)
+@frozen
 class ListRow:
     """One path, program, target, object or entry: its mark, its name, and what is to be known of it in few words.
 
@@ -58,7 +58,7 @@ class ListRow:
     fix: Fix | None = None
 
 
-@dataclass(frozen=True)
+@frozen
 class Group:
     """Rows under one title, with how many they are where that is ``counted``."""
 
@@ -67,7 +67,7 @@ class Group:
     counted: bool = True
 
 
-@dataclass(frozen=True)
+@frozen
 class Fix:
     """The one thing to do, and where the page shows it; ``instead`` of what was found wrong, or else next."""
 
@@ -76,7 +76,7 @@ class Fix:
     instead: bool = True
 
 
-@dataclass(frozen=True)
+@frozen
 class Answer:
     """The first screen of a page.
 

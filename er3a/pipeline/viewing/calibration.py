@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from er3a.by_value import by_identity
 from er3a.calibration.calibrate import Calibration, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.observations import Measurement, PointObservations, observed
@@ -40,7 +41,7 @@ AXES = ("x", "y", "z")
 MODELS = {"before": N_("before"), "table": N_("robot file"), "model": N_("with terms")}
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class MeasuredErrors:
     """A calibration at the positions that it was made from.
 

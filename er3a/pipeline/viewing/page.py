@@ -10,7 +10,7 @@ import shlex
 import subprocess
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from importlib.metadata import version
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 from markupsafe import Markup
 
+from er3a.by_value import frozen
 from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, from_here, view_command, write_text
 from er3a.pipeline import language
@@ -93,7 +94,7 @@ SCRIPT_WORDS = {
 MARKS = {"figure": N_("Figure {number}"), "table": N_("Table {number}")}
 
 
-@dataclass(frozen=True)
+@frozen
 class Numbered:
     """What a figure or table is called on its page, and its address there."""
 
@@ -117,7 +118,7 @@ class Numbering:
         return Numbered(address if again == 1 else f"{address}-{again}", tr(MARKS[kind], number=self._counts[kind]))
 
 
-@dataclass(frozen=True)
+@frozen
 class Picture:
     """A figure for a page: the image, what it shows (for those who can't see it), and what to conclude from it.
 
@@ -161,7 +162,7 @@ class Picture:
         return float(self.figure.get_figwidth())
 
 
-@dataclass(frozen=True)
+@frozen
 class ShownFigure:
     """A key figure in the page's language; the unit of a part of a whole is the whole, in words.
 
@@ -183,7 +184,7 @@ class ShownFigure:
         return measured(self.value, self.uncertainty, self.measure)
 
 
-@dataclass(frozen=True)
+@frozen
 class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 

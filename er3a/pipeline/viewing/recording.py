@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from er3a.by_value import by_identity, frozen
 from er3a.collision.scene import Plane, Scene
 from er3a.files.kept_files import write_atomically
 from er3a.kinematics.forward import skeleton
@@ -66,7 +67,7 @@ GONE = rr.Clear(recursive=False)
 Logged = rr.AsComponents | Sequence[rr.AsComponents]
 
 
-@dataclass(frozen=True)
+@frozen
 class Curves:
     """A panel of curves over time.
 
@@ -108,7 +109,7 @@ class Curves:
         return cls(entity, title, limits=in_units(robot, ends))
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Run(PlayedMotion):
     """What the arm does in one go; its times begin at 0, and where ``q`` is NaN it stays as it is.
 
@@ -136,7 +137,7 @@ class Run(PlayedMotion):
     pause_s: float = PAUSE_S
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Recorded:
     """What a recording holds.
 
@@ -497,7 +498,7 @@ def _log_run(stream: rr.RecordingStream, shown: Recorded, run: Run, start: float
     return {entity for _, entity, _ in shapes}
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Clock:
     """The times of a run: on the timeline of all runs, where it begins at ``start`` (s), and on one of its own."""
 

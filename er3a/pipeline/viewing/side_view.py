@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from markupsafe import Markup
 
+from er3a.by_value import by_identity
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames, skeleton
 from er3a.numerics.arrays import Integers, Reals
@@ -44,7 +44,7 @@ SCALES_MM = (100, 200, 500, 1000, 2000)
 SMOOTHED = 16  # times that a corner of an outline goes to the middle between it and the next
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class SeenArm:
     """An arm from the side.
 
@@ -65,7 +65,7 @@ class SeenArm:
     way: Reals | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Label:
     """A word at a place (2,), mm, in the colour of its kind.
 
@@ -84,7 +84,7 @@ class Label:
     written_there: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class DrawnLine:
     """A line over the arms: points (k, 2), mm, the class of its look, the entry of the table that it is of, and a word
     near it, where there is room."""

@@ -4,12 +4,12 @@ way of the fewest."""
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from er3a.by_value import by_identity, frozen
 from er3a.collision.along import STEP, first_overlap
 from er3a.collision.pairs import names_of
 from er3a.collision.scene import Box, Scene
@@ -44,7 +44,7 @@ def _box(name: str, low: Reals, high: Reals) -> Box:
     return Box(name, transform((low + high) / 2, np.zeros(3)), high - low)
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Tray:
     """A tray at a place, with the stand that it needs.
 
@@ -135,7 +135,7 @@ class Tray:
         return Scene("tray", (_box("tray", *self.corners),), carried.carried if carried else ())
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class StoredMotion:
     """A motion as it is stored: times (n,) in s, joints (n, joints) in rad or m, tool points (n, 3) in m."""
 
@@ -150,7 +150,7 @@ class StoredMotion:
         return len(self.t) > 1 and bool(np.isfinite(self.points).all())
 
 
-@dataclass(frozen=True)
+@frozen
 class Meeting:
     """When a motion meets the tray first (s), and with what."""
 
@@ -218,7 +218,7 @@ def scene_of(study: Study, robot: str, stage: str) -> Scene | None:
     return study.scene(robot, stage if stage == "vision" else "trajectory")
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Tried:
     """A tray at a place, and of each stage's motions by name when they meet it or its stand first."""
 
@@ -226,7 +226,7 @@ class Tried:
     met: Mapping[str, Mapping[str, Meeting]]
 
 
-@dataclass(frozen=True, eq=False)
+@by_identity
 class Placing:
     """Where to put the tray: of the best places on or over each surface the one in the way of the fewest motions that
     pass without it, of equals the one that comes first.
