@@ -753,7 +753,7 @@ const next = document.querySelector(".hero:has(.look) .fix"), first = next && [n
 function showEntry(entry = entryOf(location.hash)) {
   for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
   const look = document.querySelector(".look.shown"); // of a joint that is to be jogged: the one thing to do says it
-  evidence.textContent = document.querySelector(`#cell-${entry} > a`)?.dataset.said ?? "";
+  evidence.textContent = document.getElementById(`cell-${entry}`)?.querySelector("a")?.dataset.said ?? "";
   for (const link of document.querySelectorAll(".grid .key > a")) link.hash = document.getElementById(`entry-${entry}`)?.id ?? "marks";
   if (next) [next.querySelector("span").lastChild.data, next.querySelector("a").hash] = look ? [` ${look.dataset.next}`, `#cell-${entry}`] : first;
   for (const link of entryLinks) link.toggleAttribute("data-shown", [entryOf(link.hash), link.dataset.asked].includes(entry));
