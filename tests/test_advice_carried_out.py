@@ -35,7 +35,7 @@ CARRIED_OUT = {
     **{f"singular.{kind}": OF_PROGRAMS for kind in ("wrist", "elbow", "shoulder")},
     **{f"not_followed.{reason}": OF_PROGRAMS for reason in NOT_FOLLOWED},
     "remedy.zone_too_large": OF_PROGRAMS,
-    "remedy.limit": OF_PROGRAMS,
+    **dict.fromkeys(("remedy.limit", "remedy.jump"), OF_PROGRAMS),
     "remedy.end": "test_a_line_that_ends_where_advised_keeps_its_margin",
     **{f"remedy.{form}": OF_PROGRAMS for form in ("solid", "links")},
     "gap.units": "test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read",

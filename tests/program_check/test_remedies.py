@@ -92,6 +92,11 @@ def last(check):
     return list(check.motions.values())[-1].end
 
 
+def found_of(check, code):
+    """The finding of a code."""
+    return next(each.finding for each in check.findings if each.finding.code == code)
+
+
 HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
 AT_HOME = "PTP {A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"
 NONE = "[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -145,7 +150,10 @@ MENDED = {
         (krl("LIN {A1 64,A2 13,A3 -75,A4 27,A5 -60,A6 -166}"), BESIDE),
         (krl("LIN {A1 64,A2 -10}"), BESIDE),
     ),
-    "joint_jumps": (krl("PTP {A4 -180,A5 70,A6 180}"), krl(AT_HOME)),
+    "joint_jumps": (
+        krl("PTP {A4 -180,A5 70,A6 180}"),
+        lambda found: krl(f"PTP {{A4 {found_of(found, 'joint_jumps').near_deg},A5 -70,A6 0}}"),
+    ),
     "singular.wrist": (krl("PTP {A5 -20}", "LIN {A1 2,A5 20}"), krl("PTP {A5 -20}", "LIN {A1 2,A5 -30}")),
     "configuration_ends": (
         (krl("LIN_REL {X 194,Y -206,Z -57}"), TURNED),
