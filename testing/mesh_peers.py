@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.distances import some_distances
+from er3a.collision.distances import measure
 from er3a.collision.pairs import link_label
 from er3a.collision.shapes import arm_bodies, layout_of
 from er3a.formats.urdf import UrdfImport
@@ -158,8 +158,8 @@ def _shape_distances(robot: Robot, q: np.ndarray) -> dict[tuple[int, int], tuple
     """Of each two links the least distance (N,) of their shapes, at most 0 where they overlap, and their pairs."""
     own = arm_bodies(robot)
     pairs = [(a, b) for a, b in product(range(len(own)), repeat=2) if own[a].link < own[b].link]
-    layout, every = layout_of(robot, own, pairs), np.arange(len(pairs))
-    found = np.array([some_distances(layout, joints, every)[0] for joints in q])
+    layout, found, none = layout_of(robot, own, pairs), np.empty((len(q), len(pairs))), np.empty(len(q))
+    measure(layout, q, found, none, np.empty(len(q), np.int64), np.empty(len(q), bool))
     columns: dict[tuple[int, int], list[int]] = {}
     for column, (a, b) in enumerate(pairs):
         columns.setdefault((own[a].link, own[b].link), []).append(column)

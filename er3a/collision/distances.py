@@ -27,9 +27,9 @@ from er3a.collision.convex import (
     lines_distance,
     support,
 )
-from er3a.collision.triangles import Trees, hulls_distance, surface_above_plane, surface_distance
+from er3a.collision.triangles import Trees, surface_above_plane, surface_distance
 from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
-from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 HULL, CYLINDER, HALF_SPACE = 0, 1, 2
@@ -38,7 +38,6 @@ HULL, CYLINDER, HALF_SPACE = 0, 1, 2
 WORLD = -1  # link of the bodies around the arm
 DEEPEST = 512  # boxes that wait at one time
 FREE, MEETS, UNDECIDED = 0, 1, 2
-SETTLED = 5e-10  # m; surfaces that are nearest within this of where their hulls are
 NARROW = 1e-6  # m; a box in which bodies move by less is not halved
 BEYOND = (
     1e-3  # m; surfaces are measured so much farther than settles a box, as what is returned may be no more than that
@@ -108,15 +107,12 @@ def pair_distance(
         if convex:
             return above_plane(w, i, i_end, disc[a], j, room, near) - sizes, False
         normal = (w[j, 0], w[j, 1], w[j, 2])
-        return surface_above_plane(trees, T[link[a]], a, normal, w[j + 1, 0], near), False
+        return surface_above_plane(trees, T[link[a]], trees.root[a], normal, w[j + 1, 0], near), False
     if i_end - i <= 2 and j_end - j <= 2 and kind[a] == HULL and kind[b] == HULL:
         return lines_distance(w, i, i_end - 1, j, j_end - 1, near) - sizes, False
-    least = np.inf if convex else max(far, 0.0) + sizes
-    core = cores_distance(w, (i, i_end, j, j_end), disc[a], disc[b], room, near, least)
-    if convex or core > least:
+    core = cores_distance(w, (i, i_end, j, j_end), disc[a], disc[b], room, near, np.inf)
+    if convex or core - sizes > max(far, 0.0):
         return core - sizes, core == 0.0
-    if trees.root[a] >= 0 and trees.root[b] >= 0:
-        return surfaces_distance(trees, a, T[link[a]], b, T[link[b]], room, near, max(far, 0.0))
     if trees.root[a] < 0:
         other = (w, i, i_end, disc[a])
         for turn in range(2):
@@ -128,42 +124,6 @@ def pair_distance(
         other = (w, j, j_end, disc[b])
         core = surface_distance(trees, a, T[link[a]], b, T[link[b]], other, room, near, far + sizes)
     return core - sizes, core == 0.0
-
-
-@inner_kernel
-def surfaces_distance(
-    trees: Trees, a: int, T: Reals, b: int, S: Reals, room: Reals, near: Reals, far: float
-) -> tuple[float, bool]:
-    """Distance of two surfaces, and whether they cross: that of their hulls, where these are nearest on the surfaces.
-
-    Parameters
-    ----------
-    a, b, T, S : numbers of the bodies, and what places them
-    room, near, far : as for :func:`pair_distance`; ``near`` holds a guess
-
-    Returns
-    -------
-    distance, overlap : m
-    """
-    least, close, ends = hulls_distance(trees, a, T, b, S, room, near, far), np.empty((2, 3)), np.empty((2, 3))
-    if least > far:
-        return least, False
-    best = far
-    if least > 0 and far > 0:  # the surfaces' own points nearest to the hulls' nearest ones
-        for k, body, frame in ((0, a, T), (1, b, S)):
-            surface_distance(trees, body, frame, -1, frame, (near, k, k + 1, 0.0), room, close, np.inf)
-            for r in range(3):
-                ends[k, r] = close[0, r]
-        size = 0.0
-        for r in range(3):
-            size += (ends[1, r] - ends[0, r]) ** 2
-        best = min(far, np.sqrt(size))
-        copy_values(ends[0], near[0])
-        copy_values(ends[1], near[1])
-        if best - least <= SETTLED:
-            return best, False
-    core = surface_distance(trees, a, T, b, S, (room, 0, 0, 0.0), room, near, best)
-    return core, core == 0.0
 
 
 @inner_kernel
@@ -303,34 +263,47 @@ def some_distances(layout: Layout, q: Reals, pairs: Integers) -> tuple[Reals, Fl
 
 
 @kernel
-def measure(layout: Layout, q: Reals, smallest: Reals, pair: Integers, deep: Flags) -> None:
-    """The smallest distance in many arm poses; of overlapping cores the smallest known depth.
+def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integers, deep: Flags) -> None:
+    """Distances of all pairs in many arm poses, or the smallest of each; of overlapping cores the smallest known depth.
 
-    At first only whether surfaces overlap. Then pairs that can't be the nearest are left out. What was nearest in the
-    pose before is measured first, as it mostly is again.
+    Without columns of ``found`` pairs that can't be the nearest are left out: hulls first, then surfaces, the nearest
+    hulls around them first.
 
     Parameters
     ----------
     q : (N, n), rad or m
+    found : (N, K), gets all distances, m; or (0, 0)
     smallest, pair : (N,), get the smallest distance, m, and its number; joined pairs count only where they overlap
     deep : (N,), gets whether cores overlapped, or a surface and another body, whose depth is not known then
     """
     room, near = np.empty((ROOM, 3)), np.zeros((2, 3))
     T, w, middle = unplaced(layout)
-    reach, first, second = layout.reach, layout.first, layout.second
-    root, count, at = layout.trees.root, len(first), -1
+    reach, first, second, joined = layout.reach, layout.first, layout.second, layout.joined
+    every, root, least = found.shape[1] > 0, layout.trees.root, np.empty(len(first))
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
-        start, best, at, inside = max(at, 0), np.inf, -1, False
-        for turn in range(-count, count):
-            k = (start + turn) % count
+        best, at, inside = np.inf, -1, False
+        for k in range(len(first)):
             a, b = first[k], second[k]
-            surface, far = root[a] >= 0 or root[b] >= 0, 0.0 if turn < 0 else best
-            if inside or (turn < 0 and not surface) or _apart(middle, reach, a, b) >= far:
+            least[k] = np.inf
+            if not every and _apart(middle, reach, a, b) >= best:
                 continue
-            distance, overlap = pair_distance(layout, T, w, a, b, room, near, 0.0 if layout.joined[k] else far)
-            inside = overlap or (surface and distance < 0)
-            if distance < best and (inside or turn >= 0) and not (layout.joined[k] and distance >= 0 and not overlap):
+            distance, overlap = pair_distance(layout, T, w, a, b, room, near, np.inf if every else 0.0)
+            surface = root[a] >= 0 or root[b] >= 0
+            inside = inside or overlap or (surface and distance < 0)
+            if every:
+                found[n, k] = distance
+            elif surface and not inside:
+                least[k] = np.inf if joined[k] else distance
+            if least[k] == np.inf and distance < best and not (joined[k] and distance >= 0 and not overlap):
+                best, at = distance, k
+        while not inside and len(least):
+            k = int(least.argmin())
+            if least[k] >= best:
+                break
+            distance = pair_distance(layout, T, w, first[k], second[k], room, near, best)[0]
+            least[k] = np.inf
+            if distance < best:
                 best, at = distance, k
         smallest[n], pair[n], deep[n] = best, at, inside
 

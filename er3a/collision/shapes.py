@@ -487,7 +487,7 @@ def depth_inside(body: Body, other: Body, T: Reals) -> float:
     """
     if body.tree is None and len(body.points) <= 2 and body.kind != CYLINDER:
         return 0.0
-    points = (other.points if other.tree is None else other.tree.corner[:, 0]) @ T[:3, :3].T + T[:3, 3]
+    points = (other.points if other.tree is None else other.tree.corner.reshape(-1, 3)) @ T[:3, :3].T + T[:3, 3]
     low, high = body.points.min(axis=0) - body.disc, body.points.max(axis=0) + body.disc
     points = points[((points >= low) & (points <= high)).all(axis=1)]
     points = points[:: max(-(-len(points) // LOOKED_AT), 1)]
@@ -497,7 +497,7 @@ def depth_inside(body: Body, other: Body, T: Reals) -> float:
 def _depths_in(body: Body, points: Reals) -> Reals:
     if body.tree is not None:
         found = np.zeros(len(points))
-        depths_inside(trees_of([body.tree]), np.ascontiguousarray(points), found)
+        depths_inside(trees_of([body.tree, None]), np.ascontiguousarray(points), found)
         return found
     if body.kind == HALF_SPACE:
         return np.asarray(body.points[1, 0] - points @ body.points[0])
