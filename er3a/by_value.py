@@ -62,6 +62,11 @@ class ByValue:
         return _restored, (kind, held, read_only)
 
 
+def _as_its_bases(kind: type[Held], slots: bool) -> type[Held]:
+    compares, prints = not issubclass(kind, ByValue), not issubclass(kind, Displayed)
+    return dataclass(frozen=True, slots=slots, eq=compares, repr=prints)(kind)
+
+
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
 def frozen(kind: type[Held]) -> type[Held]:
     """Make a frozen dataclass, which keeps how its base compares (:class:`ByValue`) and prints (:class:`Displayed`).
@@ -74,7 +79,7 @@ def frozen(kind: type[Held]) -> type[Held]:
     -------
     kind : the same class; without these bases it compares and prints as dataclasses do
     """
-    return dataclass(frozen=True, eq=not issubclass(kind, ByValue), repr=not issubclass(kind, Displayed))(kind)
+    return _as_its_bases(kind, slots=False)
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
@@ -89,8 +94,7 @@ def slotted(kind: type[Held]) -> type[Held]:
     -------
     kind : a new class, because slots can't be added to one
     """
-    own = not issubclass(kind, ByValue), not issubclass(kind, Displayed)
-    return dataclass(frozen=True, slots=True, eq=own[0], repr=own[1])(kind)
+    return _as_its_bases(kind, slots=True)
 
 
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))

@@ -250,9 +250,9 @@ def _motors(motors: Sequence[model.MotorNeed]) -> list[list[str]]:
     return [
         [
             _label(motor.joint, motor.unit),
-            *(fixed(value, torque) if value else NONE for value in (motor.peak, motor.rms, motor.holding)),
+            *(fixed(value, torque) if motor.inertia_high else NONE for value in (motor.peak, motor.rms, motor.holding)),
             fixed(motor.speed, 1),
-            fixed(motor.power_w, power) if motor.power_w else NONE,
+            fixed(motor.power_w, power) if motor.inertia_high else NONE,
             *(
                 NONE if value is None else number(value, 3)
                 for value in (motor.motor_torque, motor.motor_rpm, motor.rated_limit, motor.peak_limit)
