@@ -157,7 +157,7 @@ ORDERS = st.permutations(list(NAMES))
 
 
 def read(tmp_path, text, name="table.txt", **options):
-    (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / name).write_text(text, encoding="utf-8", newline="")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return read_dh_table(tmp_path / name, "arm", as_printed=True, **options)
