@@ -22,7 +22,8 @@ from er3a.pipeline.stages.trajectory.judgement import Judgement
 from er3a.pipeline.stages.trajectory.judgement import judged as judgement_of
 from er3a.pipeline.stages.trajectory.motion import Motion, MotionTask, motion_of
 from er3a.planning.commands import CommandSource
-from er3a.planning.names import PathVerdict
+from er3a.planning.motion_faults import RATES
+from er3a.planning.names import TOO_FAST, PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
 from testing.dense_contacts import Contacts
 from testing.motion_oracle import GRAZING, GRAZING_JERK, TOUCH, Truth, arm_of, factors, joint_path, truth
@@ -169,8 +170,9 @@ def compare(robot, spec, written, samples, tally: Tally, seen: Truth) -> list[st
     tally.paths += 1
     tally.undecided += found.verdict == "undecided"
     tally.safe += found.verdict == "safe"
-    ends = bool(found.beyond) or bool(motion.followed and motion.followed.jumps)
-    if seen.out_of_reach or found.beyond:
+    beyond = found.faults.get("unreachable")
+    ends = bool(beyond) or bool(motion.followed and motion.followed.jumps)
+    if seen.out_of_reach or beyond:
         tally.unreachable += 1
         if not (seen.out_of_reach and ends and found.verdict != "safe"):
             tally.missed_unreachable += 1
@@ -179,8 +181,11 @@ def compare(robot, spec, written, samples, tally: Tally, seen: Truth) -> list[st
     if any(event.crossing for event in found.events) and "q_start" in spec:
         return wrong  # which branch goes on behind it is a choice
     near = BESIDE * (seen.t[1] - seen.t[0])
-    claimed = [(0, part.cause.joint - 1, part.start, part.end) for part in found.limits]
-    claimed += [(_order(part.cause.code), part.cause.joint - 1, part.start, part.end) for part in found.fast]
+    claimed = [
+        (_order(part.cause.code), part.cause.joint - 1, part.start, part.end)
+        for kind in ("leaves limits", *TOO_FAST)
+        for part in found.faults.get(kind, ())
+    ]
     for order, joint, start, end in seen.stretches:
         tally.stretches[order] += 1
         if not any(c[:2] == (order, joint) and c[2] <= end + near and c[3] >= start - near for c in claimed):
@@ -232,7 +237,7 @@ def _limit(limits: JointLimits, order: int, joint: int) -> float:
 
 
 def _order(code: str) -> int:
-    return 3 if code.startswith("jerk") else 1 if code.startswith("too_fast") else 2
+    return 1 + [*RATES].index(code) if code in RATES else 0
 
 
 def _crossings(arm, spec, seen, found, tally, wrong):

@@ -11,9 +11,9 @@ meets a sine to rounding, sines and shoulder distance become series too. A chang
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Generic, Literal, TypeVar
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
+from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.piecewise import Pieces, PiecewiseMotion, evaluated, interpolated
 from er3a.robots.joint_limits import limit_amounts
 from er3a.robots.robot import Robot, derived
@@ -77,16 +78,13 @@ def merged(spans: list[tuple[float, float]], gap: float) -> list[tuple[float, fl
     return kept
 
 
-RateCause = Finding
-"""Of a code of :data:`RATES`: ``joint`` (from 1), and the amounts ``needed`` and ``limit``, whose basis is that of the
-finding; ``needed`` is None where an acceleration steps."""
 RATES = {"too_fast": "/s", "acceleration_too_great": "/s²", "jerk_too_great": "/s³"}
 """Codes of what exceeds a limit of a rate, and what the rate is by, in the order of the derivative."""
 
 
 def rate_fault(
     order: int, joint: int, needed: float, limit: float, slides: bool = False, assumed: bool = False
-) -> RateCause:
+) -> Finding:
     """That a joint would need more of a rate than it has.
 
     Parameters
@@ -98,7 +96,8 @@ def rate_fault(
 
     Returns
     -------
-    finding : its basis says whether the limit is assumed
+    finding : of a code of :data:`RATES`: ``joint``, and the amounts ``needed`` (None where an acceleration steps) and
+        ``limit``; its basis says whether the limit is assumed
     """
     code, per = [*RATES.items()][order - 1]
     need = None if order == 3 and needed == np.inf else turned_or_moved(needed, slides, per)
@@ -106,7 +105,7 @@ def rate_fault(
     return replace(found, basis="assumed") if assumed else found
 
 
-def rate_ratio(cause: RateCause) -> float:
+def rate_ratio(cause: Finding) -> float:
     """Rate needed over rate allowed, greater than 1; infinite where the acceleration steps.
 
     Parameters
@@ -117,17 +116,57 @@ def rate_ratio(cause: RateCause) -> float:
 
 
 OVER = 1e-6  # relative, by which rounding may exceed a limit of rates
-CauseT = TypeVar("CauseT", bound=Finding)
 
 
 @frozen
-class Interval(Generic[CauseT]):
+class Interval:
     """A stretch of time (s), what is wrong in it, and, where that has a value, when it is worst."""
 
     start: float
     end: float
-    cause: CauseT
+    cause: Finding
     worst: float | None = None
+
+
+KINDS: Mapping[str, PathVerdict] = {
+    "out_of_reach": "unreachable",
+    **dict.fromkeys(("above_limit", "below_limit", "limit_exceeded", "combination_exceeded"), "leaves limits"),
+    "bodies_overlap": "collides",
+    **dict.fromkeys(RATES, "too fast"),
+    "undecided": "undecided",
+}
+"""What a motion comes to, by the code of a cause. A fault that is new has an entry here, and its intervals in
+:func:`over_limits`: then paths, their repairs, plans, grasps and pages know it."""
+
+
+class Caused(Protocol):
+    """A stretch with its cause."""
+
+    @property
+    def cause(self) -> Finding:
+        """What is wrong in it."""
+
+
+CausedT = TypeVar("CausedT", bound=Caused)
+
+
+def by_kind(parts: Iterable[CausedT]) -> dict[PathVerdict, list[CausedT]]:
+    """Stretches by what a motion comes to because of them.
+
+    Parameters
+    ----------
+    parts : in the order of time; what exceeds assumed limits is a kind of its own
+
+    Returns
+    -------
+    found : the most serious kind first; only kinds that there are
+    """
+    found: dict[PathVerdict, list[CausedT]] = {kind: [] for kind in PATH_VERDICTS}
+    for part in parts:
+        kind = KINDS[part.cause.code]
+        assumed = kind == "too fast" and part.cause.basis == "assumed"
+        found["too fast for the assumed limits" if assumed else kind].append(part)
+    return {kind: own for kind, own in found.items() if own}
 
 
 @by_identity
@@ -155,9 +194,7 @@ class RateLimit:
         return self.most * (1 + OVER)
 
 
-def rate_interval(
-    limit: RateLimit, joint: int, start: float, end: float, most: float, worst: float
-) -> Interval[RateCause]:
+def rate_interval(limit: RateLimit, joint: int, start: float, end: float, most: float, worst: float) -> Interval:
     """A stretch on which a joint exceeds a limit of its rate.
 
     Parameters
@@ -264,7 +301,7 @@ def limit_sides(robot: Robot) -> list[LimitSide]:
     ]
 
 
-def unreachable(robot: Robot, followed: Followed) -> list[Interval[Finding]]:
+def unreachable(robot: Robot, followed: Followed) -> list[Interval]:
     """Where no branch of the closed form reaches the pose, with the distance missing at the worst grid point.
 
     Parameters
@@ -286,7 +323,7 @@ def unreachable(robot: Robot, followed: Followed) -> list[Interval[Finding]]:
     return found
 
 
-def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[Finding]]:
+def limit_intervals(robot: Robot, motion: PiecewiseMotion, tolerance: float = LIMIT_TOLERANCE) -> list[Interval]:
     """Where joints, or sums of joints, leave their limits.
 
     Parameters
@@ -303,13 +340,13 @@ def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[Find
         for side in limit_sides(robot)
         if (side.sign * side.factors * ends).max(axis=0).sum() > side.sign * side.limit
         for start, end, most, worst in Pieces(motion.times, side.of(motion.angle)).above(
-            side.sign * side.limit + LIMIT_TOLERANCE
+            side.sign * side.limit + tolerance
         )
     ]
     return sorted(found, key=lambda interval: (interval.start, joints_of(interval.cause)))
 
 
-def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval[RateCause]]:
+def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval]:
     """Where joints exceed a limit of speed, acceleration or jerk.
 
     Parameters
@@ -332,6 +369,27 @@ def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval[R
             steps = motion.times[motion.steps[:, j] > limit.step_allowed[j]]
             found += [rate_interval(limit, j, t, t, np.inf, t) for t in steps.tolist()]
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
+
+
+def over_limits(
+    robot: Robot, motion: PiecewiseMotion, rates: Iterable[RateLimit] = (), tolerance: float = LIMIT_TOLERANCE
+) -> list[Interval]:
+    """Where a motion leaves what the arm may do: the one judge of paths, their repairs, plans, grasps and programs.
+
+    Parameters
+    ----------
+    motion : of n joints, rad or m
+    rates : limits of them that count
+    tolerance : rad or m, by which a limit of a joint may be passed
+
+    Returns
+    -------
+    intervals : of limits of joints, then of each rate, each sorted by start (s)
+    """
+    return [
+        *limit_intervals(robot, motion, tolerance),
+        *(part for limit in rates for part in rate_intervals(motion, limit)),
+    ]
 
 
 LONGEST_TURN = 1.0  # rad, of all joints that count, within one series of the distances

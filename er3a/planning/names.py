@@ -23,6 +23,9 @@ FAULTS = PATH_VERDICTS[: PATH_VERDICTS.index("singular")]
 """Of paths that fail whatever is assumed."""
 NOT_TO_BE_RUN = PATH_VERDICTS[: PATH_VERDICTS.index("undecided")]
 """Of paths that no arm should run as they are; others pass near singular poses, or leave something open."""
+TOO_FAST: tuple[PathVerdict, ...] = ("too fast", "too fast for the assumed limits")
+UNFOLLOWED: tuple[PathVerdict, ...] = ("unreachable", "leaves limits")
+"""Of paths that some joints can't follow at any pace."""
 
 
 def gravest(found: Iterable[PathVerdict]) -> PathVerdict:

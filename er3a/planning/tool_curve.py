@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.by_value import by_identity
-from er3a.finding import Finding, fact
+from er3a.finding import fact
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import WIDE_STEP, Followed, follow
 from er3a.planning.motion_faults import Interval
@@ -74,7 +74,7 @@ def follow_as_curve(
     return followed, curve
 
 
-def open_stretches(curve: PiecewiseMotion) -> list[Interval[Finding]]:
+def open_stretches(curve: PiecewiseMotion) -> list[Interval]:
     """The gaps of a curve: where the closed form could not be met, or does not reach.
 
     Parameters

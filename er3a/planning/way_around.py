@@ -31,7 +31,7 @@ from er3a.collision.shapes import link_frames
 from er3a.errors import PathError
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
-from er3a.planning.motion_faults import limit_intervals
+from er3a.planning.motion_faults import over_limits
 from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.profiles import FromRestToRest, Rates
 from er3a.planning.sequences import JointSequence, joint_sequence
@@ -383,7 +383,7 @@ def _with_jerk(route: JointSequence, limits: JointLimits) -> Timed:
 def _proven(task: PlanningTask, corners: Reals, motion: Timed, depth: float) -> WayAround | None:
     """The motion with its clearance, if it touches nothing and keeps its limits."""
     curve = motion.curve
-    if limit_intervals(task.robot, curve):
+    if over_limits(task.robot, curve, task.limits.rates):
         return None
     grid = np.linspace(0.0, curve.duration, SHOWN)
     along = clearance_along(task.bodies, curve.joints, curve.rate_bounds, grid, grid, depth)

@@ -283,12 +283,10 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
     curve = curve_of(path)
     if path.ahead is not None and target is not None:
         found[_stopped(path, path.ahead, target)] = curve.duration  # where the arm still is
-    faults = motion_faults.limit_intervals(path.arm, curve)
-    if path.ahead is None:  # towards the end of reach rates grow without bound
-        limits = rules.limits
-        for limit in limits.rates[: 1 if limits.acceleration_assumed else 2]:
-            faults += motion_faults.rate_intervals(curve, limit)
-    found |= begun(faults)
+    limits = rules.limits
+    most = 1 if limits.acceleration_assumed else 2
+    rates = limits.rates[:most] if path.ahead is None else ()  # towards the end of reach they grow without bound
+    found |= begun(motion_faults.over_limits(path.arm, curve, rates))
     if path.of_tool and has_branches(path.arm):
         for event in motion_faults.singular_events(path.arm, curve, rules.near):
             found[_singular(path, event)] = event.t
@@ -310,14 +308,14 @@ def curve_of(path: MotionPath) -> PiecewiseMotion:
     return motion_through(spline(progress), times)
 
 
-def begun(faults: Iterable[motion_faults.Interval[Finding]]) -> Moments:
+def begun(faults: Iterable[motion_faults.Interval]) -> Moments:
     """Each fault once, from where it begins first, as it is where it is worst.
 
     Parameters
     ----------
     faults : in the order of time
     """
-    found: dict[str, motion_faults.Interval[Finding]] = {}
+    found: dict[str, motion_faults.Interval] = {}
     for part in faults:
         first = found.setdefault(part.cause.code + which(part.cause), part)
         worst = max(first.cause, part.cause, key=gravity)

@@ -23,7 +23,7 @@ from er3a.finding import Finding, fact
 from er3a.kinematics.wrist_partitioned import parallel_axes_arm, wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import limit_intervals, rate_intervals
+from er3a.planning.motion_faults import over_limits
 from er3a.planning.moves import JointMove, line
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_curve import follow_as_curve, open_stretches
@@ -164,8 +164,7 @@ def tool_leg(
     duration *= max(1.0, SPARE * slower)
     path = line(*ends, duration)
     followed, curve = follow_as_curve(robot, path, np.linspace(0, duration, CHECKS), waypoints[0])
-    over = any(rate_intervals(curve, limit) for limit in limits.rates) or limit_intervals(robot, curve)
-    if followed.jumps or over or open_stretches(curve):
+    if followed.jumps or over_limits(robot, curve, limits.rates) or open_stretches(curve):
         return None
     q_end = followed.joints(np.array([duration]))[0]
     return (GraspLeg(part, duration, followed.joints, curve.rate_bounds, q_end, ends[1]),)

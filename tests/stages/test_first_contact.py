@@ -103,7 +103,7 @@ def test_every_pair_is_named_in_the_order_in_which_it_touches_by_an_outside_orac
     t = np.linspace(0, DURATION, 601)
     apart = contacts_of(load_robot(ROBOT), scene).from_solids(joints_of(results, name)(t))
     solids = [solid.name for solid in scene.solids]
-    for part in path.collisions:
+    for part in path.of("collides"):
         inside = (t >= part.t0_s) & (t <= part.t1_s)
         least = np.where(inside[:, None, None], apart, np.inf)
         expected = {
@@ -119,9 +119,9 @@ def test_every_pair_is_named_in_the_order_in_which_it_touches_by_an_outside_orac
         for pair, (start, depth) in expected.items():
             assert start - t[1] - 1e-9 <= found[pair].t0_s <= start + 1e-9, pair
             assert found[pair].depth_mm == pytest.approx(depth, abs=0.1), pair
-    outside = np.all([(t < part.t0_s) | (t > part.t1_s) for part in path.collisions], axis=0)
+    outside = np.all([(t < part.t0_s) | (t > part.t1_s) for part in path.of("collides")], axis=0)
     assert apart[outside].min() > -TOLERANCE_MM / 1000
-    assert sum(len(part.cause.touches) for part in path.collisions) > 1
+    assert sum(len(part.cause.touches) for part in path.of("collides")) > 1
 
 
 def test_text_and_player_say_the_same_moment(made):
@@ -129,7 +129,7 @@ def test_text_and_player_say_the_same_moment(made):
     page = (folder / "page.html").read_text(encoding="utf-8")
     played = {each["name"]: each for each in json.loads(re.search(PLAYED, page)[1])["motions"]}
     for path in results.summary.paths:
-        (part,) = path.collisions
+        (part,) = path.of("collides")
         at, first = part.t0_s, part.cause.touches[0]
         assert path_text(path).startswith(f"from {at:.4g} s: link {first.pair.link} and")
         (event,) = (each for each in played[path.name]["events"] if each["text"].startswith("collision"))
@@ -145,7 +145,7 @@ def test_the_program_of_a_path_touches_first_what_the_path_does(made, tmp_path, 
     options = CheckOptions(scene=load_scene(folder / "scene.yaml"))
     found = check_program(read_program(tmp_path / f"line.{suffix}"), load_robot(ROBOT), options)
     (collision,) = (each.finding for each in found.findings if each.finding.code == "motion_collides")
-    (part,) = next(each for each in results.summary.paths if each.name == "line").collisions
+    (part,) = next(each for each in results.summary.paths if each.name == "line").of("collides")
     assert [each.pair for each in collision.touches] == [each.pair for each in part.cause.touches]
     assert collision.touches[0].at_mm == pytest.approx(1000 * part.s0_m, abs=0.1)
     for ours, theirs in zip(collision.touches, part.cause.touches):
@@ -157,5 +157,5 @@ def test_the_collision_stage_names_what_touches_first_on_a_path(made, asked):
     run.compute("collision", study, ROBOT, folder / "collision")
     verdict = read_results(folder / "collision", COLLISION).results.summary.verdict
     colliding = {each.name: each.pair for each in getattr(verdict.finding, "found", verdict.finding).colliding}
-    first = {path.name: path.collisions[0].cause.touches[0].pair for path in made[0].summary.paths}
+    first = {path.name: path.of("collides")[0].cause.touches[0].pair for path in made[0].summary.paths}
     assert colliding == first

@@ -120,7 +120,7 @@ def test_each_kind_of_path_is_in_the_study(results, name):
     assert paths["line_limits"].verdict == "leaves limits"
     out = paths["line_out"]
     assert out.verdict == "unreachable"
-    (gap,) = out.unreachable
+    (gap,) = out.of("unreachable")
     assert 0 < gap.t0_s < gap.t1_s == out.duration_s
     assert 0 < gap.s0_m < gap.s1_m == pytest.approx(out.length_m)
     assert {reason.why.code for reason in gap.cause.reasons} == {"wrist_too_far"}
@@ -150,7 +150,7 @@ def test_paths_are_what_they_claim_by_the_joints_alone(study, results, name):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_collisions_are_told_with_what_is_met_and_where(results, name):
     path = by_name(results[name])["line_collides"]
-    (meeting,) = path.collisions
+    (meeting,) = path.of("collides")
     assert 0 < meeting.t0_s < meeting.t1_s <= path.duration_s
     assert 0 < meeting.s0_m < meeting.s1_m
     assert "post" in {each.pair.params.get("solid") for each in meeting.cause.touches}
@@ -180,9 +180,9 @@ def test_a_path_that_leaves_the_reach_is_given_a_point_that_is_reached(study, re
     (fault,) = (each for each in faults(results["er3a_c60"]) if each.name == "line_out")
     t = float(re.search(r"&t=(.*?)&until=\1#", fault.instead[1])[1])
     xyz = [float(value) for value in re.search(r"\((.*?)\) mm", fault.to_do)[1].split(", ")]
-    assert 0 < t <= min(part.t0_s for part in (*path.too_fast, *path.unreachable))
+    assert 0 < t <= min(part.t0_s for part in (*path.too_fast, *path.of("unreachable")))
     assert xyz[1:] == [0.0, 400.0]
-    assert 350 < xyz[0] < 350 + 1000 * path.unreachable[0].s0_m
+    assert 350 < xyz[0] < 350 + 1000 * path.of("unreachable")[0].s0_m
     assert inverse(robot, transform(np.array(xyz) / 1000, [0, np.radians(135), 0])).within_limits.any()
 
 
@@ -204,7 +204,7 @@ def test_the_articles_line_starts_at_a_singular_pose_and_meets_a_second(article)
     assert path.singularities[1].t_s == pytest.approx(5 * (done / 2.25) ** 0.5, abs=1e-5)  # trapezoid, ramps of a third
     assert path.half_turns == (HalfTurn(1, (0, 0, 1)),)
     assert path.start_turn_deg == (0,) * 6
-    assert path.out_of_limits == path.unreachable == ()
+    assert path.of("leaves limits") == path.of("unreachable") == ()
     assert 0 < path.max_joint_speed_ratio < 1
 
 
@@ -235,7 +235,7 @@ def test_strategies_are_listed_with_their_costs(results, name):
     out = paths["line_out"]
     assert "out of reach from t = " in advice(out)
     assert ("End early, at " in advice(out)) == (out.sound_end is not None)
-    last, met = paths["line_collides"].clear_until, paths["line_collides"].collisions[0]
+    last, met = paths["line_collides"].clear_until, paths["line_collides"].of("collides")[0]
     assert 0 < last.t_s < met.t0_s
     assert f"End early, at {last.t_s:.4g} s" in advice(paths["line_collides"])
     planned = paths["line_limits"]
@@ -318,7 +318,7 @@ def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(result
     speed, limit = max(pairs, key=lambda pair: pair[0] / pair[1])
     assert tiles["max_joint_speed"] == speed
     assert ratio == pytest.approx(speed / limit)
-    assert tiles["colliding"] == sum(bool(path.collisions) for path in asked)
+    assert tiles["colliding"] == sum(bool(path.of("collides")) for path in asked)
     assert KEY_FIGURES["colliding"] == "Paths with a collision, of those meant to be safe"
 
 
@@ -497,10 +497,10 @@ def test_extreme_paths_give_results(study, tmp_path):
     run.compute("trajectory", changed, "er3a_c60", tmp_path)
     found = by_name(read_results(tmp_path, RESULTS).results)
     assert found["still"].verdict == "safe"
-    assert found["far"].unreachable[0].t1_s == 2
-    assert found["outside"].out_of_limits[0].t0_s == 0
-    assert is_one(found["outside"].out_of_limits[0].cause, "above_limit")
-    assert found["outside"].out_of_limits[0].cause.joint == 1
+    assert found["far"].of("unreachable")[0].t1_s == 2
+    assert found["outside"].of("leaves limits")[0].t0_s == 0
+    assert is_one(found["outside"].of("leaves limits")[0].cause, "above_limit")
+    assert found["outside"].of("leaves limits")[0].cause.joint == 1
     start = found["singular-start"].singularities[0]
     assert start == Singularity(0, start.until_s, "wrist", True, 0, None)
     assert found["joint-still"].singularities[0].until_s == 1
@@ -673,10 +673,11 @@ def test_a_collision_paints_the_pair_that_its_text_names_and_its_safe_end_is_sai
 
 def test_the_readme_tells_of_the_path_that_it_shows_as_the_stage_does(results):
     path = by_name(results["er3a_c60"])["line_collides"]
-    met = {each.pair for part in path.collisions for each in part.cause.touches}
+    meeting = path.of("collides")[0]
+    met = {each.pair for part in path.of("collides") for each in part.cause.touches}
     assert {(pair.link, pair.solid) for pair in met} == {(4, "post"), (6, "post")}
-    assert f"links 4 and 6 meet a post from {path.collisions[0].t0_s:.3f} s on" in answer("Is a path safe")
-    assert f"{path.collisions[0].t0_s:.3f} s" in (README.parent / "README.zh-CN.md").read_text(encoding="utf-8")
+    assert f"links 4 and 6 meet a post from {meeting.t0_s:.3f} s on" in answer("Is a path safe")
+    assert f"{meeting.t0_s:.3f} s" in (README.parent / "README.zh-CN.md").read_text(encoding="utf-8")
 
 
 def test_study_and_path_files_give_joints_that_slide_in_mm(monkeypatch):

@@ -15,7 +15,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
-from er3a.finding import fact
+from er3a.finding import fact, is_one
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.planning import times_needed
 from er3a.pipeline.messages.say import say
@@ -188,8 +188,8 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
     end = {"xyz_mm": list(path.clear_until.xyz_mm), "rpy_deg": list(path.clear_until.rpy_deg)}
     assert f"a stop takes {path.clear_until.stop_s:.2f} s" in end_text(path, path.sound_end)
     (shorter,) = paths_of(tmp_path, name, end=end, duration_s=path.duration_s * path.clear_until.s_m / path.length_m)
-    assert not shorter.collisions
-    assert not shorter.out_of_limits
+    assert not shorter.of("collides")
+    assert not shorter.of("leaves limits")
     assert shorter.clearance.least_mm >= 20
     assert shorter.length_m == pytest.approx(path.clear_until.s_m, abs=2e-4)
     assert shorter.verdict == "safe"
@@ -219,7 +219,7 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     assert shorter.verdict == "safe"
     assert shorter.clearance is None or shorter.clearance.least_mm >= 20
     first = min(
-        [s.t0_s for s in (*path.unreachable, *path.out_of_limits, *path.too_fast, *path.undecided)]
+        [part.t0_s for part in path.faults if not is_one(part.cause, "bodies_overlap")]
         + [event.t_s for event in path.singularities if event.crossing]
     )
     rows = results.checks.take(results.checks.t_s >= last.t_s)
@@ -238,7 +238,7 @@ def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_pa
     both = {"line_limits": ["leaves limits", "collides"]}
     results = compute(study_of(tmp_path, "line_limits", expect=both), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
-    assert path.collisions[0].t0_s < path.out_of_limits[0].t0_s
+    assert path.of("collides")[0].t0_s < path.of("leaves limits")[0].t0_s
     assert path.outcomes == ("collides", "leaves limits")
     assert fault.verdict == "hits itself, leaves limits"
     assert "Expected to fail, and did: line_limits (collides, leaves limits)" in say(results.summary.verdict.finding)
@@ -246,7 +246,7 @@ def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_pa
     alone = replace(path, expect=("leaves limits",))  # of a file that does not expect the collision
     (fault,) = faults(replace(results, summary=replace(results.summary, paths=(alone,))))
     assert not fault.meant
-    out = [(part.t0_s, part.t1_s) for part in path.out_of_limits]
+    out = [(part.t0_s, part.t1_s) for part in path.of("leaves limits")]
     spans = {"collides": [(out[0][0] + 0.1, out[0][1])], "leaves limits": out, "too fast": []}
     assert [each.kind for each in in_order(spans, path.duration_s)] == ["leaves limits", "collides"]
 
@@ -303,7 +303,7 @@ def test_where_a_line_leaves_the_reach_joint_speeds_have_no_bound():
     end = {"xyz_mm": [-414.2, -333.5, 469.2], "rpy_deg": [-4.0, 52.2, 53.8]}
     written = {"kind": "line", "start_deg": [-123.1, -101.6, 166.3, -178.4, 77.5, 177.8], "end": end, "duration_s": 0.5}
     _, found = judged(robot, written, 2, limits_of(robot, {"limits_jerk": False, "known_acceleration": False}))
-    (beyond,) = found.beyond
+    (beyond,) = found.faults["unreachable"]
     assert 0 < beyond.start < beyond.end == 0.5
     assert not found.speed_bounded
     assert found.max_rates is None
@@ -321,7 +321,7 @@ def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
 
 def test_a_path_that_collides_by_more_than_assumed_shapes_may_be_wrong_fails(tmp_path):
     (path,) = compute(study_of(tmp_path, "line_collides"), ROBOT).summary.paths
-    deepest = max(touch.depth_mm for part in path.collisions for touch in part.cause.touches)
+    deepest = max(touch.depth_mm for part in path.of("collides") for touch in part.cause.touches)
     assert (path.fails, deepest > 1000 * ASSUMED_MARGIN) == (True, True)
 
 
@@ -343,12 +343,13 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     nowhere = replace(path, sound_end=None)
     assert "End it" not in advised(nowhere, near)
     assert "Run no part of it: it begins near a singular pose" in advised(nowhere, near)
-    fast = replace(path.collisions[0], t0_s=0.7, cause=rate_fault(1, 2, 900.0, 180.0, assumed=True))
-    several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
-    assert [told.t_s for told in first_faults(several)] == [0.5, path.collisions[0].t0_s]
+    fast = replace(path.of("collides")[0], t0_s=0.7, cause=rate_fault(1, 2, 900.0, 180.0, assumed=True))
+    several = replace(early, faults=(*early.faults, fast), avoidance=path.avoidance * 2)
+    assert [told.t_s for told in first_faults(several)] == [0.5, path.of("collides")[0].t0_s]
     (fault,) = faults(replace(results, summary=replace(results.summary, paths=(several,))))
     assert (fault.moments[0].when, fault.moments[0].what) == ("0.500 s", "wrist singularity")
-    beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=fact("out_of_reach", reasons=())),))
+    out = replace(fast, t0_s=0.9, s0_m=0.1, cause=fact("out_of_reach", reasons=()))
+    beyond = replace(several, faults=(*several.faults, out))
     assert "From t = 0.5 s: wrist singularity; out of reach from t = 0.9 s (100.0 mm)" in advice(
         replace(beyond, sound_end=advised_end(beyond, rows, limits))
     )
@@ -372,10 +373,10 @@ def test_where_limits_are_left_before_a_contact_the_path_may_end_before_them_and
     entry = study.robots[ROBOT].model_copy(update=files)
     study = study.model_copy(update={"robots": {ROBOT: entry}, "trajectory": settings})
     out, back = compute(study, ROBOT).summary.paths
-    assert out.out_of_limits[0].t0_s < out.collisions[0].t0_s
+    assert out.of("leaves limits")[0].t0_s < out.of("collides")[0].t0_s
     limit = float(np.degrees(robot.upper[0]))
     assert limit - 5 < out.clear_until.q_deg[0] < limit
-    assert back.out_of_limits[0].t0_s == 0 < back.collisions[0].t0_s
+    assert back.of("leaves limits")[0].t0_s == 0 < back.of("collides")[0].t0_s
     assert back.clear_until is None
 
 
@@ -386,7 +387,7 @@ def test_a_fault_has_its_place_along_the_path(tmp_path, name):
     study = study_of(tmp_path, name)
     results = compute(study, ROBOT)
     (path,), (fault,), robot = results.summary.paths, faults(results), study.robot(ROBOT)
-    found = sorted(part.t0_s for part in (*path.collisions, *path.out_of_limits))[: len(fault.moments)]
+    found = sorted(part.t0_s for part in (*path.of("collides"), *path.of("leaves limits")))[: len(fault.moments)]
     assert [float(each.when.removesuffix(" s")) for each in fault.moments] == [round(t, 3) for t in found]
     rows = results.checks
     start = forward(robot, np.radians(rows.q_deg[0]))[:3, 3]
@@ -472,7 +473,7 @@ def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_
     )
     told = first_faults(out)
     assert [each.follows for each in told] == [False, True]
-    assert told[1].t_s < told[0].t_s == out.unreachable[0].t0_s
+    assert told[1].t_s < told[0].t_s == out.of("unreachable")[0].t0_s
     assert told[1].text.endswith("without bound towards the edge of the reach")
     assert cause_of(out).startswith("the edge of the reach: ")
     (event,) = near.singularities
@@ -485,7 +486,7 @@ def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_
     fast = rate_fault(1, 4, 762.0, 360.0)
     known = [replace(part, cause=fast) for part in near.too_fast if part.cause.code == "too_fast"]
     assumed = [part for part in near.too_fast if part.cause.code != "too_fast"]
-    both = first_faults(replace(near, too_fast=(*assumed, *known)))
+    both = first_faults(replace(near, faults=(*assumed, *known)))
     assert ["(assumed)" in each.text for each in both] == [True, False]
     assert both[0].t_s < both[1].t_s
 
@@ -525,7 +526,7 @@ def test_the_player_marks_what_fails_and_says_so_of_paths_near_assumed_shapes_to
     now = [each for each in shown["line_wrist_near"].events if each.t <= t <= each.until]
     assert dict(joint for each in now for joint in each.joints) == {4: "2.1 × its limit", 6: "2.1 × its limit"}
     clear = next(path for path in results.summary.paths if path.name == "line_collides")
-    near = replace(clear, verdict="safe", collisions=(), clearance=replace(clear.clearance, least_mm=11.0, t_s=2.4))
+    near = replace(clear, verdict="safe", faults=(), clearance=replace(clear.clearance, least_mm=11.0, t_s=2.4))
     verdict = results.summary.verdict
     verdict = replace(verdict, shapes=verdict.shapes.but(near=("line_collides",)))
     (shown,) = motions(robot, replace(results, summary=replace(results.summary, paths=(near,), verdict=verdict)))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.finding import Amount
+from er3a.finding import Amount, Finding
 from er3a.pipeline.language import words
 from er3a.pipeline.messages.say import WORDS, says, sentence, texts
-from er3a.planning.motion_faults import RateCause, rate_ratio
+from er3a.planning.motion_faults import rate_ratio
 from er3a.planning.names import StrategyName
 
 STRATEGIES: dict[StrategyName, str] = words(
@@ -46,7 +46,6 @@ TEXTS = texts(
         "bent_path_singular": "the bent path runs into another singular region",
         "path_not_finished": "only {done:.0%} of the path is completed",
         "ends_off_path": "it ends {distance_mm:.3g} mm and {angle_deg:.3g}° from the path's end",
-        "rate_exceeded": "a joint needs {ratio:.2f} times its greatest {rate:rate}",
         "rate": (
             "J{joint} needs [{needed:.0f}][over {times:g} times as much][a step of its acceleration{step:?}]; limit "
             "{limit:g}[ (assumed{assumed:?})]"
@@ -58,11 +57,10 @@ TEXTS = texts(
     }
 )
 WORDS["end"] = words({"start": "start", "end": "end"})
-WORDS["rate"] = words({"speed": "speed", "acceleration": "acceleration"})
 
 
 @says("too_fast", "acceleration_too_great", "jerk_too_great")
-def rate_needed(cause: RateCause) -> str:
+def rate_needed(cause: Finding) -> str:
     """What a joint needs of a rate, and what it has; far beyond that it is rounded, then no figure."""
     ratio, needed = rate_ratio(cause), cause.needed
     step, far = needed is None, ratio > UNBOUNDED

@@ -25,7 +25,7 @@ from er3a.pipeline.messages.say import (
     word,
 )
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramSummary
-from er3a.planning.motion_faults import RateCause, rate_ratio
+from er3a.planning.motion_faults import rate_ratio
 from er3a.program_check.check_program import ProgramCheck
 from er3a.program_check.program_check_findings import RANKS, Level, NotFollowedReason
 
@@ -264,7 +264,7 @@ def _(found: Finding) -> str:
     return sentence("remedy.zone_too_large", half=found.motion_mm / 2)
 
 
-def rates_text(paces: Sequence[RateCause]) -> str:
+def rates_text(paces: Sequence[Finding]) -> str:
     """What is too fast on a line, all joints together: the worst of them."""
     joints = sorted({each.joint for each in paces})
     worst = rate_needed(max(paces, key=rate_ratio))

@@ -14,8 +14,8 @@ from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
 from er3a.pipeline.messages.planning import STRATEGIES
 from er3a.pipeline.messages.say import joined, listed, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
-from er3a.planning.motion_faults import rate_ratio
-from er3a.planning.names import FAULTS, FirstFault, PathVerdict, StrategyName, in_order
+from er3a.planning.motion_faults import by_kind, rate_ratio
+from er3a.planning.names import FAULTS, FirstFault, StrategyName, in_order
 
 KEY_FIGURES = words(
     {
@@ -177,16 +177,7 @@ class FaultText(NamedTuple):
 def first_faults(path: model.PathSummary) -> list[FaultText]:
     """What makes a path fail, and what is wrong first: where each begins, in the library's order
     (:func:`er3a.planning.names.in_order`)."""
-    fast: dict[PathVerdict, list[model.Stretch]] = {"too fast": [], "too fast for the assumed limits": []}
-    for part in path.too_fast:
-        fast["too fast" if part.cause.basis == "documented" else "too fast for the assumed limits"].append(part)
-    stretches: dict[PathVerdict, Sequence[model.Stretch]] = {
-        "unreachable": path.unreachable,
-        "leaves limits": path.out_of_limits,
-        "collides": path.collisions,
-        **fast,
-        "undecided": path.undecided,
-    }
+    stretches = by_kind(path.faults)
     spans = {kind: [(part.t0_s, part.t1_s) for part in parts] for kind, parts in stretches.items()}
     found = in_order(spans | {"singular": [(event.t_s, event.t_s) for event in path.singular]}, path.duration_s)
     first = min(found, key=lambda each: each.start, default=None)
@@ -211,7 +202,7 @@ def _said(path: model.PathSummary, fault: FirstFault, parts: list[model.Stretch]
 
 def _edge(path: model.PathSummary) -> float:
     """When (s) a path first leaves the reach; infinite where it does not."""
-    return min((part.t0_s for part in path.unreachable), default=math.inf)
+    return min((part.t0_s for part in path.of("unreachable")), default=math.inf)
 
 
 def cause_of(path: model.PathSummary) -> str:
@@ -225,7 +216,7 @@ def cause_of(path: model.PathSummary) -> str:
             return sentence("path.cause", event=say(event), pose=pose) if pose else say(event)
     if path.verdict in ("singular", "near-singular") and path.singularities:
         return singular_pose(path.singularities[0].type)
-    return sentence("path.edge") if any(each.follows for each in first_faults(path)) and path.unreachable else ""
+    return sentence("path.edge") if any(each.follows for each in first_faults(path)) and path.of("unreachable") else ""
 
 
 def _beside(event: model.Singularity, part: model.Stretch) -> bool:
@@ -298,11 +289,11 @@ def no_repair(path: model.PathSummary) -> str:
             return sentence("advice.none", why=reasons(only))
         why = sentence("path.cause", event=strategy_word(only.name), pose=reasons(only))
         return sentence("advice.none", why=why)
-    if path.unreachable:
-        spans = [sentence("path.stretch", start=each.t0_s, end=each.t1_s) for each in path.unreachable]
+    if path.of("unreachable"):
+        spans = [sentence("path.stretch", start=each.t0_s, end=each.t1_s) for each in path.of("unreachable")]
         why = sentence("path.cause", event=joined(spans, ", "), pose=sentence("beyond_reach"))
     else:
-        causes = [say(part.cause) for part in path.out_of_limits] or [reasons(tried) for tried in path.avoidance]
+        causes = [say(part.cause) for part in path.of("leaves limits")] or [reasons(tried) for tried in path.avoidance]
         why = joined(dict.fromkeys(causes))
     return _within_reach(path) or sentence("advice.none", why=why)
 
@@ -319,7 +310,7 @@ def end_text(path: model.PathSummary, end: model.SoundEnd) -> str:
 def whole_pace(path: model.PathSummary) -> str:
     """The pace at which the whole path keeps the limits, and the setting that gives it; empty where none does."""
     speed, acceleration = path.max_joint_speed_ratio, path.max_joint_acceleration_ratio
-    other = bool(path.unreachable or path.out_of_limits or path.collisions or path.jumps)
+    other = bool(path.of("unreachable") or path.of("leaves limits") or path.of("collides") or path.jumps)
     other = other or any(is_one(each.cause, "jerk_too_great") for each in path.too_fast)
     if path.strategy != "slow" or speed is None or acceleration is None or other or not path.too_fast:
         return ""
@@ -329,7 +320,7 @@ def whole_pace(path: model.PathSummary) -> str:
 
 def _within_reach(path: model.PathSummary) -> str:
     """How far a path that leaves the reach could be used; empty for others."""
-    part = min(path.unreachable, key=lambda part: part.t0_s, default=None)
+    part = min(path.of("unreachable"), key=lambda part: part.t0_s, default=None)
     if part is None or part.s0_m <= 0:
         return ""
     first = min(first_faults(path))

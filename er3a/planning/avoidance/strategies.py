@@ -29,11 +29,12 @@ from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
 from er3a.planning.avoidance import avoidance
 from er3a.planning.follow import Followed, follow
+from er3a.planning.motion_faults import by_kind, over_limits
 from er3a.planning.moves import ToolPath
 from er3a.planning.names import StrategyName
 from er3a.planning.profiles import quintic
 from er3a.planning.timing import Timed, TimingError, joined, straight
-from er3a.robots.joint_limits import limits_exceeded, within
+from er3a.robots.joint_limits import within
 
 Kind = Literal["shift", "tilt"]
 
@@ -519,7 +520,7 @@ STRATEGIES: dict[StrategyName, avoidance.Strategy] = {
 }
 ARRIVED = 1e-3, np.radians(0.1)  # m and rad from the path's end
 ON_PATH = 1e-6, np.radians(1e-4)
-OVER = 1e-6  # relative, by which rounding may exceed a limit
+BETWEEN_POINTS = 1e-4  # rad or m: a curve through points at a limit may pass it by as little
 
 
 @by_identity
@@ -622,12 +623,8 @@ def _tried(segment: avoidance.SingularSegment, name: StrategyName) -> StrategyRe
         reasons.append(fact("path_not_finished", done=found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
         reasons.append(fact("ends_off_path", distance_mm=left * 1000, angle_deg=np.degrees(twisted)))
-    worst = np.argmax(np.maximum(motion.q - robot.upper, robot.lower - motion.q).max(axis=1))
-    if exceeded := limits_exceeded(robot, motion.q[worst]):
-        reasons.append(exceeded)
-    for rate, ratio in {"speed": speed, "acceleration": acceleration}.items():
-        if ratio > 1 + OVER:
-            reasons.append(fact("rate_exceeded", rate=rate, ratio=ratio))
+    over = over_limits(robot, motion.curve, (segment.allowed or segment.limits).rates, BETWEEN_POINTS)
+    reasons += [parts[0].cause for parts in by_kind(over).values()]
     keeps = found.crosses_by_joints or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
     cost = StrategyCost(motion, found.done, distance, angle, speed, acceleration, keeps)
     return StrategyResult(name, cost, tuple(reasons))

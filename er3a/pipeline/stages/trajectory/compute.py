@@ -41,7 +41,7 @@ from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare_strategies, deviation
 from er3a.planning.motion_faults import Interval, SingularEvent
-from er3a.planning.names import PATH_VERDICTS, PathVerdict, StrategyName
+from er3a.planning.names import PATH_VERDICTS, TOO_FAST, UNFOLLOWED, PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import WayAround, way_between
 from er3a.robots.joint_limits import shown, speeds_given, within
@@ -100,7 +100,8 @@ class AvoidanceTask(MotionTask):
                     replace(segment, limits=self._no_more_than(found), allowed=self.limits), self.only
                 )
         collides = bool(found.along.contacts)
-        if (collides or found.beyond or found.limits) and motion.not_planned is None and self.only in (None, "planned"):
+        barred = collides or not found.faults.keys().isdisjoint(UNFOLLOWED)
+        if barred and motion.not_planned is None and self.only in (None, "planned"):
             results += self._planned(motion)
         ends, name = found.along.distance[[0, -1]], motion.entry.name
         margin = float(min([self.margin, *(ends[ends > 0] - ROUNDED)]))  # no more than the ends of the path have
@@ -127,7 +128,7 @@ class AvoidanceTask(MotionTask):
 
     def _no_more_than(self, found: judgement.Judgement) -> JointLimits:
         """The limits, or what of them the path needs if that is less."""
-        if found.fast or found.max_rates is None:
+        if found.max_rates is None or not found.faults.keys().isdisjoint(TOO_FAST):
             return self.limits
         limits = self.limits.speed, self.limits.acceleration
         ratios = (float((most / limit).max()) for most, limit in zip(found.max_rates, limits))
@@ -159,7 +160,7 @@ class AvoidanceTask(MotionTask):
         t, q = nodes_along(motion.joints, motion.t, motion.q, self.limits)
         try:
             quickest = fastest(q, self.limits)
-            if not found.fast:
+            if found.faults.keys().isdisjoint(TOO_FAST):
                 return quickest, []
             slower = fastest(q, self.limits, t)
         except TimingError:
@@ -335,10 +336,7 @@ def path_summary(
         sliding=tuple((np.flatnonzero(robot.slides) + 1).tolist()),
         start_turn_deg=None if followed is None else tuple(np.degrees(followed.start_turn).tolist()),
         singularities=tuple(_singularity(event) for event in found.events),
-        unreachable=_stretches(motion, found.beyond),
-        out_of_limits=_stretches(motion, found.limits),
-        too_fast=_stretches(motion, found.fast),
-        undecided=_stretches(motion, found.undecided),
+        faults=_stretches(motion, [*(part for own in found.faults.values() for part in own), *contacts]),
         jumps=tuple(
             model.Jump(jump.t, jump.joint, float(np.degrees(jump.angle)))
             for jump in (followed.jumps if followed else ())
@@ -347,7 +345,6 @@ def path_summary(
         max_joint_speed_ratio=_ratio(speed, limits.speed),
         max_joint_acceleration_ratio=_ratio(acceleration, limits.acceleration),
         joint_speed_bounded=found.speed_bounded,
-        collisions=_stretches(motion, contacts),
         clearance=judgement.min_clearance(found.along),
         not_planned=motion.not_planned,
         fastest_s=avoided.fastest_s,
@@ -376,7 +373,7 @@ def _singularity(event: SingularEvent) -> model.Singularity:
     )
 
 
-def _stretches(motion: Motion, intervals: Iterable[Interval[Finding]]) -> tuple[model.Stretch, ...]:
+def _stretches(motion: Motion, intervals: Iterable[Interval]) -> tuple[model.Stretch, ...]:
     """Intervals in time and on the tool point's way."""
     found = []
     for interval in intervals:
@@ -588,7 +585,7 @@ def _figures(
         for joint, (speed, limit) in enumerate(zip(path.max_joint_speed_deg_s or (), limits.speed_deg_s), 1)
     ]
     speed, limit, unit = max(speeds, key=lambda each: each[0] / each[1], default=(None, None, "deg/s"))
-    colliding = sum(bool(path.collisions) for path in asked)
+    colliding = sum(bool(path.of("collides")) for path in asked)
     return (
         Figure("safe", sum(model.is_safe(path, shapes) for path in asked), "", of=len(asked)),
         Figure("singular_poses", sum(event.crossing for event in events), ""),

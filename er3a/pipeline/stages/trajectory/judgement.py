@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import scipy
@@ -12,13 +12,13 @@ from er3a.collision.along import ClearanceAlong, Contact, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import label_of
 from er3a.collision.shapes import surely_touch
-from er3a.finding import Finding, fact
+from er3a.finding import fact
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.motion import Motion, MotionTask
 from er3a.planning import motion_faults
-from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict, gravest, in_order
+from er3a.planning.names import FAULTS, NOT_TO_BE_RUN, UNFOLLOWED, PathVerdict, gravest, in_order
 from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.tool_curve import open_stretches
 from er3a.robots.joint_limits import shown
@@ -40,9 +40,7 @@ class Judgement:
     ----------
     verdict : the gravest; of_joints : the gravest where bodies are passed over
     outcomes : all that it came to, the first fault first
-    fast : where a joint exceeds a limit of speed, acceleration or jerk
-    undecided : where the bounds leave something open
-    beyond : where no branch reaches the pose
+    faults : where no branch reaches the pose, joints exceed a limit, or the bounds leave something open
     along : its clearance
     max_rates : maximum speeds (n,), rad/s, and accelerations (n,), rad/s^2, if any are known
     times, q, velocity, acceleration : (N,) s and (N, n) in rad, rad/s, rad/s^2 at all points of the table
@@ -53,10 +51,7 @@ class Judgement:
     of_joints: PathVerdict
     outcomes: tuple[PathVerdict, ...]
     events: list[motion_faults.SingularEvent]
-    limits: list[motion_faults.Interval[Finding]]
-    fast: list[motion_faults.Interval[motion_faults.RateCause]]
-    undecided: list[motion_faults.Interval[Finding]]
-    beyond: list[motion_faults.Interval[Finding]]
+    faults: Mapping[PathVerdict, list[motion_faults.Interval]]
     along: ClearanceAlong
     max_rates: tuple[Reals, Reals] | None
     times: Reals
@@ -94,38 +89,28 @@ def judged(task: MotionTask, motion: Motion, along: ClearanceAlong | None = None
     edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
     bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
     known = np.isfinite(curve.velocity).any()  # not where the tool reaches no point of its path
-    limits = motion_faults.limit_intervals(task.robot, curve)
-    fast = [part for limit in task.limits.rates for part in motion_faults.rate_intervals(curve, limit)]
-    undecided = [] if ends else open_stretches(curve)
+    over = motion_faults.over_limits(task.robot, curve, task.limits.rates)
+    parts = motion_faults.by_kind([*beyond, *over, *([] if ends else open_stretches(curve))])
     along = along or measured(task.bodies, task.tolerance, motion)
-    spans: dict[PathVerdict, list[tuple[float, float]]] = {
-        "unreachable": [(part.start, part.end) for part in beyond],
-        "leaves limits": [(part.start, part.end) for part in limits],
-        "collides": [(contact.start, contact.end) for contact in along.contacts],
-        "too fast": [(part.start, part.end) for part in fast if part.cause.basis != "assumed"],
-    }
-    faults: dict[PathVerdict, object] = {
-        **spans,
+    spans = {kind: [(part.start, part.end) for part in own] for kind, own in parts.items() if kind in FAULTS}
+    if along.contacts:
+        spans["collides"] = [(contact.start, contact.end) for contact in along.contacts]
+    others: dict[PathVerdict, object] = {
         "none found": motion.not_planned,
         "singular": followed and (jumps or crossed),
-        "too fast for the assumed limits": fast,
-        "undecided": undecided,
         "near-singular": followed and events,
     }
-    there = [name for name, found in faults.items() if found]
+    there = [*parts, *spans, *(name for name, found in others.items() if found)]
     verdict = gravest(there)
     if motion.not_planned:  # then the straight move is shown
-        spans = {"collides": spans["collides"]}
+        spans = {kind: own for kind, own in spans.items() if kind == "collides"}
     firsts = in_order({verdict: [(0.0, 0.0)], **spans}, float(motion.built.duration))
     return Judgement(
         verdict=verdict,
         of_joints=gravest(name for name in there if name != "collides"),
         outcomes=tuple(each.kind for each in firsts if not each.follows),
         events=events,
-        limits=limits,
-        fast=fast,
-        undecided=undecided,
-        beyond=beyond,
+        faults=parts,
         along=along,
         max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)) if known and bounded else None,
         times=times,
@@ -150,7 +135,7 @@ def measured(bodies: Bodies, tolerance: float, motion: Motion) -> ClearanceAlong
     return clearance_along(bodies, motion.joints, motion.rate_bounds, motion.t, motion.samples, tolerance)
 
 
-def collisions(robot: Robot, along: ClearanceAlong, margin: float) -> list[motion_faults.Interval[Finding]]:
+def collisions(robot: Robot, along: ClearanceAlong, margin: float) -> list[motion_faults.Interval]:
     """Stretches of a motion on which bodies overlap.
 
     Parameters
@@ -267,7 +252,7 @@ def safe_stop(
 
 def last_safe_stop(task: MotionTask, motion: Motion, found: Judgement, margin: float) -> model.ClearUntil | None:
     """The last point from which a path still stops with a margin (m) kept, as of :func:`safe_stop`."""
-    stops = [part.start for part in (*found.limits, *found.beyond)]
+    stops = [part.start for kind in UNFOLLOWED for part in found.faults.get(kind, ())]
     last = safe_stop(task, motion, motion.t, found.along.contacts, stops, margin)
     if last is None:
         return None
@@ -341,19 +326,20 @@ def advised_end(path: model.PathSummary, rows: model.PathChecks, limits: model.L
     collision's margin is kept nowhere, or no motion was planned.
     """
     until = path.clear_until
-    if path.not_planned or (path.collisions and until is None):
+    if path.not_planned or (path.of("collides") and until is None):
         return None
-    faults = path.unreachable, path.out_of_limits, path.too_fast, path.undecided
-    starts = [part.t0_s for stretches in faults for part in stretches] + [event.t_s for event in path.singular]
+    found = motion_faults.by_kind(path.faults)
+    starts = [part.t0_s for kind, own in found.items() if kind != "collides" for part in own]
+    starts += [event.t_s for event in path.singular]
     starts += [] if path.in_joint_space else rows.t_s[rows.near_singular][:1].tolist()
     first = min(starts, default=np.inf)
     stop = (np.abs(rows.q_deg_s) / limits.acceleration_deg_s2).max(axis=1)
     kept = rows.reachable & (rows.t_s + STOPS * stop <= first) & (np.nan_to_num(rows.speed_ratio) <= SPEED_MARGIN)
-    for part in path.out_of_limits:
+    for part in found.get("leaves limits", ()):
         joints, at = [j - 1 for j in motion_faults.joints_of(part.cause)], int(np.argmin(np.abs(rows.t_s - part.t0_s)))
         if joints:
             kept &= np.abs(rows.q_deg[:, joints] - rows.q_deg[at, joints]).max(axis=1) >= LIMIT_MARGIN
-    for lost in path.unreachable:
+    for lost in found.get("unreachable", ()):
         kept &= rows.s_m <= lost.s0_m - REACH_MARGIN
     if until and (np.isinf(first) or kept[rows.t_s <= until.t_s][-1:].any()):
         return model.SoundEnd(until.t_s, until.xyz_mm)

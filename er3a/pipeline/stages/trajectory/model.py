@@ -19,7 +19,8 @@ from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
-from er3a.planning.names import FAULTS, PathVerdict, StrategyName
+from er3a.planning.motion_faults import by_kind
+from er3a.planning.names import FAULTS, TOO_FAST, PathVerdict, StrategyName
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table", "plan"]
 FASTEST: Literal["fastest"] = "fastest"
@@ -201,8 +202,8 @@ class PathSummary:
     in_joint_space : whether it is a move of the joints, which singular poses do no harm
     branches : of the closed form, in the order in which they serve
     start_turn_deg : by which the arm turns at rest before it starts; None in joint space
-    too_fast : where a joint exceeds a limit of speed, acceleration or jerk
-    undecided : where the bounds between the poses that are solved leave something open
+    faults : where it is out of reach, exceeds a limit of angles or rates, collides, or is not decided between the poses
+        that are solved; :meth:`of` has those of a kind
     corner_deviation_mm, corner_deviation_deg : by how much rounded corners miss their points at most
     max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound; speeds
         of prismatic joints (``sliding``, from 1) in mm/s
@@ -233,16 +234,12 @@ class PathSummary:
     repeated_rows: tuple[int, ...]
     start_turn_deg: tuple[float, ...] | None
     singularities: tuple[Singularity, ...]
-    unreachable: tuple[Stretch, ...]
-    out_of_limits: tuple[Stretch, ...]
-    too_fast: tuple[Stretch, ...]
-    undecided: tuple[Stretch, ...]
+    faults: tuple[Stretch, ...]
     jumps: tuple[Jump, ...]
     max_joint_speed_deg_s: tuple[float, ...] | None
     max_joint_speed_ratio: float | None
     max_joint_acceleration_ratio: float | None
     joint_speed_bounded: bool
-    collisions: tuple[Stretch, ...]
     clearance: MinClearance | None
     not_planned: Finding | None
     fastest_s: float | None
@@ -252,6 +249,16 @@ class PathSummary:
     clear_until: ClearUntil | None = None
     sound_end: SoundEnd | None = None
     of_program: tuple[FindingAt, ...] = ()
+
+    def of(self, *kinds: PathVerdict) -> tuple[Stretch, ...]:
+        """Its stretches of some kinds of faults, each kind in the order of time."""
+        found = by_kind(self.faults)
+        return tuple(part for kind in kinds for part in found.get(kind, ()))
+
+    @property
+    def too_fast(self) -> tuple[Stretch, ...]:
+        """Where a joint exceeds a limit of speed, acceleration or jerk."""
+        return self.of(*TOO_FAST)
 
     @property
     def singular(self) -> list[Singularity | Jump]:
@@ -274,7 +281,7 @@ class PathSummary:
         """Whether it can't be run as it is: it is at fault, no joints follow it, or its program fails. Only bodies that
         touch for certain are a fault."""
         faults = set(FAULTS).intersection(self.outcomes)
-        if not any(touch.certain for part in self.collisions for touch in part.cause.touches):
+        if not any(touch.certain for part in self.of("collides") for touch in part.cause.touches):
             faults -= {"collides"}
         lost = self.verdict == "singular" and (bool(self.jumps) or not self.joint_speed_bounded)
         return bool(faults) or lost or any(each.level == "fail" for each in self.of_program)

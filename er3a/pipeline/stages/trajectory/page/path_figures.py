@@ -85,8 +85,8 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
     before : of the path, if the motion repairs it
     """
     figure, ax = new_figure(width=5.2, height=3.0)
-    fast = path.too_fast and path.verdict != "singular" and not path.unreachable
-    edge = before is None and path.unreachable and any(each.type == "elbow" for each in path.singularities)
+    fast = path.too_fast and path.verdict != "singular" and not path.of("unreachable")
+    edge = before is None and path.of("unreachable") and any(each.type == "elbow" for each in path.singularities)
     column, label, title = "smallest_singular_value", tr("smallest singular value"), tr("Distance from singular poses")
     if fast:
         column, label, title = "speed_ratio", tr("speed / limit"), tr("Fastest joint")
@@ -128,10 +128,10 @@ def _key(ax: Axes) -> None:
 def _mark(ax: Axes, path: model.PathSummary) -> None:
     """Shade what is wrong, and mark singular poses."""
     shades = (
-        (path.out_of_limits, palette.VERDICTS["caution"], 0.16),
+        (path.of("leaves limits"), palette.VERDICTS["caution"], 0.16),
         (path.too_fast, palette.VERDICTS["fail" if path.fails else "caution"], 0.14),
-        (path.unreachable, palette.INK, 0.14),
-        (path.collisions, palette.VERDICTS["fail"], 0.3),
+        (path.of("unreachable"), palette.INK, 0.14),
+        (path.of("collides"), palette.VERDICTS["fail"], 0.3),
     )
     for stretches, colour, alpha in shades:
         for part in stretches:

@@ -35,7 +35,7 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
-from er3a.planning.motion_faults import RATES, rate_ratio
+from er3a.planning.motion_faults import RATES, by_kind, rate_ratio
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -272,8 +272,8 @@ def shown_verdict(path: model.PathSummary, near: Finding | None) -> tuple[Weight
     if path.verdict == "safe" and near:
         return "caution", tr("{far} mm clear (assumed)", far=fixed(near.clearance_mm, 1))
     said = {each: outcome_word(each) for each in path.outcomes}
-    if path.collisions:
-        said["collides"] = hit_word(path.collisions[0].cause.touches[0].pair)
+    if path.of("collides"):
+        said["collides"] = hit_word(path.of("collides")[0].cause.touches[0].pair)
     return weight, joined(said.values(), ", ")
 
 
@@ -292,7 +292,7 @@ def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> F
 
 def events(path: model.PathSummary) -> list[PlayedEvent]:
     """Singular poses and faults of a path."""
-    faults = [(kind, part) for kind, stretches in kinds(path) for part in stretches]
+    faults = [(outcome_word(kind), part) for kind, own in by_kind(path.faults).items() for part in own]
     weight: Weight = "plain" if path.verdict == "safe" else "caution"  # of a pass by a singular pose
     return [
         PlayedEvent(s.t_s, s.until_s, _singular(s), weight, axes=s.axes or SINGULAR_AXES.get(s.type, ()))
@@ -302,7 +302,7 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
             s.t0_s,
             s.t1_s,
             tr("{fault}: {cause}", fault=kind, cause=_few_words(s)),
-            _weight(path, s),
+            _weight(s),
             _touching(s.cause),
             _joints(s.cause),
         )
@@ -340,8 +340,8 @@ def _joints(cause: object) -> tuple[tuple[int, str], ...]:
     return ((joint, times_needed(rate_ratio(cause))),)
 
 
-def _weight(path: model.PathSummary, part: model.Stretch) -> Weight:
-    return "caution" if _assumed(part) or part in path.undecided else "fail"
+def _weight(part: model.Stretch) -> Weight:
+    return "caution" if _assumed(part) or is_one(part.cause, "undecided") else "fail"
 
 
 def contact(path: model.PathSummary) -> list[Mark]:
@@ -349,15 +349,15 @@ def contact(path: model.PathSummary) -> list[Mark]:
     if path.clear_until is None:
         return []
     x, y, z = (value / 1000 for value in path.clear_until.contact_mm)
-    return [Mark(part.t0_s, part.t1_s, (x, y, z), (x, y, z), tr("first contact")) for part in path.collisions[:1]]
+    return [Mark(part.t0_s, part.t1_s, (x, y, z), (x, y, z), tr("first contact")) for part in path.of("collides")[:1]]
 
 
 def _beyond(path: model.PathSummary, rows: model.PathChecks) -> list[Mark]:
     """The rest of a path that ends beyond the reach, dashed, and how far beyond it ends; ``rows``: of the path."""
-    if not path.unreachable or rows.reachable[-1]:
+    if not path.of("unreachable") or rows.reachable[-1]:
         return []
     at = np.linspace(np.flatnonzero(rows.reachable).max(initial=0), len(rows) - 1, 2 * DASHES + 1).astype(int)
-    points, said = (rows.xyz_mm[at] / 1000).tolist(), [*[""] * (DASHES - 1), _few_words(path.unreachable[-1])]
+    points, said = (rows.xyz_mm[at] / 1000).tolist(), [*[""] * (DASHES - 1), _few_words(path.of("unreachable")[-1])]
     return [Mark(0.0, path.duration_s, *ends) for ends in zip(points[1::2], points[2::2], said)]
 
 
@@ -369,14 +369,3 @@ def _touching(cause: object) -> tuple[str, ...]:
 def _singular(event: model.Singularity) -> str:
     word = event_word(event)
     return tr("singular: {type}", type=word) if event.crossing else tr("near-singular: {type}", type=word)
-
-
-def kinds(path: model.PathSummary) -> tuple[tuple[str, tuple[model.Stretch, ...]], ...]:
-    """The stretches of each kind of fault, with its name."""
-    return (
-        (tr("not reachable"), path.unreachable),
-        (tr("outside limits"), path.out_of_limits),
-        (tr("too fast"), path.too_fast),
-        (tr("undecided"), path.undecided),
-        (tr("collision"), path.collisions),
-    )

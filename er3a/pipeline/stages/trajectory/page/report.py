@@ -104,7 +104,7 @@ def paths_answer(robot: Robot, results: model.TrajectoryResults) -> Answer:
 def _by_name(results: model.TrajectoryResults) -> dict[str, Fault]:
     """What is wrong with paths, by their names: what is not as expected first, then what collides, of these what has no
     other fault."""
-    known = {path.name: (not path.collisions, len(path.outcomes)) for path in results.summary.paths}
+    known = {path.name: (not path.of("collides"), len(path.outcomes)) for path in results.summary.paths}
     return {fault.name: fault for fault in sorted(faults(results), key=lambda each: (each.meant, *known[each.name]))}
 
 
@@ -203,7 +203,7 @@ def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
 def _over_time(path: model.PathSummary, results: model.TrajectoryResults) -> list[tuple[str, Picture]]:
     """Of a path, and of the motion that repairs it: its name, and over time what fails, or else how near it comes."""
     checks = _drawn(path, results.checks.take(results.checks.path == path.name))
-    if path.verdict != "safe" and not path.collisions and (path.too_fast or path.singularities):
+    if path.verdict != "safe" and not path.of("collides") and (path.too_fast or path.singularities):
         drawn = [(path.name, fault_picture(path.name, path, checks))]
         if path.chosen:
             tried = results.avoidance
