@@ -132,7 +132,7 @@ def test_text_and_player_say_the_same_moment(made):
         (part,) = path.of("collides")
         at, first = part.t0_s, part.cause.touches[0]
         assert path_text(path).startswith(f"from {at:.4g} s: link {first.pair.link} and")
-        (event,) = (each for each in played[path.name]["events"] if each["text"].startswith("collision"))
+        (event,) = (each for each in played[path.name]["events"] if each["text"].startswith("collides"))
         assert event["t"] == at
 
 
