@@ -33,8 +33,9 @@ from er3a.planning.motion_faults import by_kind, over_limits
 from er3a.planning.moves import ToolPath
 from er3a.planning.names import StrategyName
 from er3a.planning.profiles import quintic
-from er3a.planning.timing import Timed, TimingError, joined, straight
+from er3a.planning.timing import JointLimits, Timed, TimingError, joined, straight
 from er3a.robots.joint_limits import within
+from er3a.robots.robot import Robot
 
 Kind = Literal["shift", "tilt"]
 
@@ -604,6 +605,17 @@ def best(results: Iterable[StrategyResult], meets: bool, programmed: float = 0.0
     return min(usable)[2] if usable else None
 
 
+def beyond_limits(robot: Robot, motion: Timed, limits: JointLimits) -> list[Finding]:
+    """Which limits a strategy's motion does not keep, by the judge of all motions.
+
+    Returns
+    -------
+    causes : of each kind the first
+    """
+    over = over_limits(robot, motion.curve, limits.rates, BETWEEN_POINTS)
+    return [parts[0].cause for parts in by_kind(over).values()]
+
+
 def _tried(segment: avoidance.SingularSegment, name: StrategyName) -> StrategyResult:
     try:
         found = STRATEGIES[name](segment)
@@ -623,8 +635,7 @@ def _tried(segment: avoidance.SingularSegment, name: StrategyName) -> StrategyRe
         reasons.append(fact("path_not_finished", done=found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
         reasons.append(fact("ends_off_path", distance_mm=left * 1000, angle_deg=np.degrees(twisted)))
-    over = over_limits(robot, motion.curve, (segment.allowed or segment.limits).rates, BETWEEN_POINTS)
-    reasons += [parts[0].cause for parts in by_kind(over).values()]
+    reasons += beyond_limits(robot, motion, segment.allowed or segment.limits)
     keeps = found.crosses_by_joints or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
     cost = StrategyCost(motion, found.done, distance, angle, speed, acceleration, keeps)
     return StrategyResult(name, cost, tuple(reasons))

@@ -39,7 +39,14 @@ from er3a.pipeline.stages.trajectory.motion import (
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes, program_files
 from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
-from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare_strategies, deviation
+from er3a.planning.avoidance.strategies import (
+    StrategyCost,
+    StrategyResult,
+    best,
+    beyond_limits,
+    compare_strategies,
+    deviation,
+)
 from er3a.planning.motion_faults import Interval, SingularEvent
 from er3a.planning.names import PATH_VERDICTS, TOO_FAST, UNFOLLOWED, PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
@@ -167,9 +174,8 @@ class AvoidanceTask(MotionTask):
             return None, []
         speed, acceleration = slower.ratios(self.limits)
         nothing = np.zeros(len(slower.t))
-        return quickest, [
-            StrategyResult("slow", StrategyCost(slower, 1.0, nothing, nothing, speed, acceleration, False))
-        ]
+        cost = StrategyCost(slower, 1.0, nothing, nothing, speed, acceleration, False)
+        return quickest, [StrategyResult("slow", cost, tuple(beyond_limits(self.robot, slower, self.limits)))]
 
     def _along(self, motion: Timed) -> ClearanceAlong:
         """The clearance along a strategy's motion."""
