@@ -101,7 +101,7 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     robot, results = study.robot(name), stored["workspace"].results
     drawing = from_above(robot, results, study.scene(name, "capability"), placing.tray, LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
-    answer = with_unit(millimetres(placing.tray.place.centre_m), "mm")
+    answer = whole_sentence(with_unit(millimetres(placing.tray.place.centre_m), "mm"))
     voids = [
         (about(void), if_normal(void, void_name(k, void)))
         for k, void in enumerate(results.summary.voids, 1)
@@ -110,7 +110,7 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     keys, page = [payload_key(known, robot), *voids[:1]], f"{name}/workspace.html"
     return Tile(
         tr("Where the tray goes"),
-        f"{answer}.",
+        answer,
         whole_sentence(placing.tray.where),
         "pass",
         page,

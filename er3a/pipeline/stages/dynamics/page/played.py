@@ -84,7 +84,7 @@ def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> lis
     end = tuple(at + lever)
     far, heavy = with_unit(fixed(MM * float(np.linalg.norm(lever)), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
     tip, aside = at + lever - [0, 0, DROP_M], HEAD_M * lever / np.linalg.norm(lever)
-    head = [Mark(0.0, 1.0, tuple(tip), tuple(tip + [0, 0, HEAD_M] + way), "") for way in (aside, -aside)]
+    head = [Mark(0.0, 1.0, tuple(tip), tuple(tip + way - [0, 0, -HEAD_M]), "") for way in (aside, -aside)]
     return [Mark(0.0, 1.0, tuple(at), end, far), Mark(0.0, 1.0, end, tuple(tip), heavy), *head]
 
 
