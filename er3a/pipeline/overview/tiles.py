@@ -82,9 +82,9 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     ----------
     found : of the stage trajectory or programs
     """
-    results, answer, what = found.results, paths_answer, tr("paths")
-    if isinstance(results, ProgramsResults):
-        answer, what = programs_answer, tr("programs")
+    results = found.results
+    of_program = isinstance(results, ProgramsResults)
+    answer, what = (programs_answer, tr("programs")) if of_program else (paths_answer, tr("paths"))
     said = answer(study.robot(name), results)
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
