@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from er3a.by_value import frozen
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key
-from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.results import Stored
@@ -19,6 +18,7 @@ from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section, known_alone
 from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import placing_of
+from er3a.pipeline.stages.workspace.page.workspace_figures import about, if_normal, void_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import ListRow, Mark
 from er3a.pipeline.viewing.page import whole_sentence
@@ -32,10 +32,11 @@ LETTERS = 0.14  # of the reach, in the small view from above
 class Tile:
     """An answer, which leads to its page, and its picture.
 
-    ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``, ``rows``, ``drawing``: what is
-    shown, one of them; ``more``: how many rows are left to the page.
+    ``asked``: what it answers, by ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``,
+    ``rows``, ``drawing`` with ``keys``: what is shown, one of them; ``more``: how many rows are left to the page.
     """
 
+    asked: str
     answer: str
     rest: str
     mark: Mark
@@ -44,6 +45,7 @@ class Tile:
     rows: Sequence[ListRow] = ()
     more: int = 0
     drawing: str = ""
+    keys: Sequence[tuple[str, str]] = ()
 
 
 def first_with(stage: str, names: Iterable[str], stored: Mapping[str, Results]) -> str | None:
@@ -64,13 +66,13 @@ def table_tile(name: str, stored: Results) -> Tile | None:
     evidence = results.summary.evidence
     bad = evidence.contradicted
     answer = (
-        tr("{count} of {all} numbers contradicted.", count=bad, all=known_alone(evidence))
+        tr("{count} of {all} contradicted: given → right.", count=bad, all=known_alone(evidence))
         if bad
         else tr("{count} numbers not settled", count=len(evidence.unconfirmed))
     )
     mark: Mark = "fail" if bad else "caution" if evidence.unconfirmed else "pass"
     entries = evidence_section(evidence)
-    return Tile(answer, "", mark, f"{name}/validation.html", entries)
+    return Tile(tr("Which numbers are wrong?"), answer, "", mark, f"{name}/validation.html", entries)
 
 
 def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
@@ -81,11 +83,14 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     found : of the stage trajectory or programs
     """
     results = found.results
-    answer = programs_answer if isinstance(results, ProgramsResults) else paths_answer
+    of_program = isinstance(results, ProgramsResults)
+    answer, what = (programs_answer, tr("programs")) if of_program else (paths_answer, tr("paths"))
     said = answer(study.robot(name), results)
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
-    return Tile(said.headline, said.rest, sound, f"{name}/{found.stage}.html", rows=rows[:FEW], more=len(rows[FEW:]))
+    page = f"{name}/{found.stage}.html"
+    asked = tr("Which {what} may run?", what=what)
+    return Tile(asked, said.headline, said.rest, sound, page, rows=rows[:FEW], more=len(rows[FEW:]))
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
@@ -96,7 +101,19 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     robot, results = study.robot(name), stored["workspace"].results
     drawing = from_above(robot, results, study.scene(name, "capability"), placing.tray, LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
-    answer = tr("Tray centre: {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
-    carried = joined(payload_key(known, robot)[::-1], ": ")
-    rest = joined(map(whole_sentence, (placing.tray.where, carried)), " ")
-    return Tile(answer, rest, "pass", f"{name}/workspace.html", drawing=drawing)
+    answer = whole_sentence(with_unit(millimetres(placing.tray.place.centre_m), "mm"))
+    voids = [
+        (about(void), if_normal(void, void_name(k, void)))
+        for k, void in enumerate(results.summary.voids, 1)
+        if void.kind == "enclosed"
+    ]
+    keys, page = [payload_key(known, robot), *voids[:1]], f"{name}/workspace.html"
+    return Tile(
+        tr("Where the tray goes"),
+        answer,
+        whole_sentence(placing.tray.where),
+        "pass",
+        page,
+        drawing=drawing,
+        keys=keys,
+    )

@@ -149,7 +149,7 @@ function draw() {
   const css = touching.size || wrong ? page.touching : page.ink;
   for (const { from, to, text } of marks) {
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
-    else space.line([from, to], text ? css : page.ink, text ? 4 : 2), text && [from, to].forEach((end) => space.dot(end, css, 4));
+    else space.line([from, to], text ? css : page.ink, text ? 4 : 3), text && [from, to].forEach((end) => space.dot(end, css, 4));
     space.keepClear([0, 0.25, 0.5, 0.75, 1].map((part) => add(scaled(from, 1 - part), scaled(to, part))), 0);
   }
   if (motion.loads) tellLoads(poses[0]);

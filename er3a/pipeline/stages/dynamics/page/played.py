@@ -18,7 +18,7 @@ from er3a.robots.robot import Robot
 
 MM = 1000.0
 LEVEL = 0.01  # sine of an axis' slope, up to which it counts as level
-DROP_M = 0.2  # length of a line drawn for a weight
+DROP_M, HEAD_M = 0.2, 0.03  # length of an arrow drawn for a weight, and of its head
 FELT = 0.01  # of the greatest peak: what is less is no event
 
 
@@ -83,7 +83,9 @@ def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> lis
     lever = kg @ off / kg.sum()
     end = tuple(at + lever)
     far, heavy = with_unit(fixed(MM * float(np.linalg.norm(lever)), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
-    return [Mark(0.0, 1.0, tuple(at), end, far), Mark(0.0, 1.0, end, (*end[:2], end[2] - DROP_M), heavy)]
+    tip, aside = at + lever - [0, 0, DROP_M], HEAD_M * lever / np.linalg.norm(lever)
+    head = [Mark(0.0, 1.0, tuple(tip), tuple(tip + way - [0, 0, -HEAD_M]), "") for way in (aside, -aside)]
+    return [Mark(0.0, 1.0, tuple(at), end, far), Mark(0.0, 1.0, end, tuple(tip), heavy), *head]
 
 
 def within(value: float, tolerance: float, decimals: int = 2) -> str:

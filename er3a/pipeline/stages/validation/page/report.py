@@ -70,6 +70,7 @@ RADIUS = 0.045  # of such an arrow, of the size of the arm
 BELOW = 0.15  # of a reach: from one line to the next below the base
 LARGER = 10  # the difference between what documents state, in its drawing
 LABELLED = 5  # of the lengths that are wrong, at most, so that words have room
+AHEAD = 1.12  # of the way to a jogged arm's end: what is said of it
 UP, MARK_MM = [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)], 1000.0  # where a mark on the flange is that is seen to turn
 JOG = np.radians(np.linspace(0.0, 30.0, 13))  # of a joint that one looks at
 VIEWS = {  # from x, y and z to what is to the right and upwards for one who looks from there
@@ -185,7 +186,7 @@ def _both_arms(
             labels.append(Label(text, np.array([0.0, -step * row]), kind, "seen", written_there=True))
             over += dimension(stated.expected, -step * (row + 0.5), own.points_mm[-1, 1], kind)
         ends = np.array([stated.expected for stated in each.statements])[[0, -1]]
-        wide = ends.mean() - 2 * step + LARGER * (ends - ends.mean())
+        wide = ends.mean() - 3 * step + LARGER * (ends - ends.mean())
         corners = np.array([[ends[0], *wide, ends[1]], [2 * step, step, step, 2 * step]])
         over.append(DrawnLine(corners.T, "dimension open"))
         text = tr("{far}, {times} times larger", far=with_unit(fixed(np.ptp(ends), 1), each.unit), times=LARGER)
@@ -238,7 +239,7 @@ def _look(robot: Robot, found: Finding) -> Markup:
     ]
     size = 2 * RADIUS * float(np.ptp(arms[0].points_mm, axis=0).max())
     turns = [DrawnLine(_headed(np.array(arm.way)[:, -1], size), f"turn {arm.kind}") for arm in arms]
-    labels = [Label(arm.title, arm.points_mm[-1], arm.kind) for arm in arms]
+    labels = [Label(arm.title, AHEAD * arm.points_mm[-1], arm.kind) for arm in arms]
     before = DrawnLine(np.array(arms[0].way)[0], "before")
     drawn = side_view(arms, ratio=1.0, labels=labels, over=[before, *turns])
     title = tr("+J{joint}, {side}", joint=found.joint, side=tr(side))

@@ -25,12 +25,10 @@ from er3a.robots.robot import Robot
 WAYS = {"move": N_("move to the approach"), "approach": N_("straight to the grasp"), "retreat": N_("retreat")}
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
 ROUND_M = {"radius": 0.02, "length": 0.06}
-SIGHT = 0.2  # of the farthest distance, how far the pyramid of a camera reaches that moves with the arm
-PALE, EDGE = 0.06, 0.5  # opacity of the pyramid's foot, and of its edges
-EDGE_M = 0.0015  # radius
+SIGHT = 0.2  # of the farthest distance, how far the pyramid reaches that shows where a camera looks
+EDGE, EDGE_M = 0.5, 0.0015  # opacity and radius of the pyramid's edges
 CAMERA_M = (0.09, 0.07, 0.07)
 EDGES = ((0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1))  # of a pyramid, its top first
-FOOT = [[1, 2, 3], [1, 3, 4], [3, 2, 1], [4, 3, 1]]  # seen from both sides
 
 
 def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[PlayedMotion]:
@@ -98,8 +96,8 @@ def placed(pose: PoseEstimate | ObjectResult) -> Reals:
 
 
 def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[Shape]:
-    """The camera with the edges of what it sees, and a box at each object, or a cylinder where it looks the same at any
-    angle; a camera on the arm moves with it.
+    """The camera with a pyramid that shows where it looks, and a box at each object, or a cylinder where it looks the
+    same at any angle; a camera on the arm moves with it.
 
     Returns
     -------
@@ -115,10 +113,8 @@ def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[
     frame = 0 if fixed_camera else robot.rows + 1
     common = {"frame": frame, "name": tr("camera"), "T": T.tolist(), "colour": REFERENCE}
     corners = _corners(task, SIGHT * task.view.farthest_mm / 1000)
-    if fixed_camera:
-        corners = _down(T, _corners(task, task.view.farthest_mm / 1000), summary)
     points = np.concatenate([np.zeros((1, 3)), corners])
-    sight = [{"kind": "mesh", "points": points.tolist(), "faces": FOOT, "pale": PALE}]
+    sight = []
     for i, j in EDGES:
         edge, length = T @ frame_between(points[i], points[j]), float(np.linalg.norm(points[i] - points[j]))
         sight.append({"kind": "cylinder", "T": edge.tolist(), "radius": EDGE_M, "length": length, "pale": EDGE})
@@ -130,14 +126,6 @@ def _corners(task: VisionFile, far: float) -> Reals:
     """The corners (4, 3) of what a camera sees at a depth, m, in its frame."""
     x, y = far * np.tan(np.radians([task.view.horizontal_deg, task.view.vertical_deg]) / 2)
     return np.array([[-x, -y, far], [x, -y, far], [x, y, far], [-x, y, far]])
-
-
-def _down(T: Reals, corners: Reals, summary: VisionSummary) -> Reals:
-    """The corners (4, 3), m, of what a camera at ``T`` sees, down to the foot of its lowest object."""
-    lowest = min((each.xyz_mm[2] / 1000 for each in summary.objects), default=-np.inf) - OBJECT_M[2] / 2
-    falls = -(corners @ T[2, :3])
-    shares = np.divide(T[2, 3] - lowest, falls, out=np.ones(4), where=falls > T[2, 3] - lowest)
-    return corners * shares[:, None]
 
 
 def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:

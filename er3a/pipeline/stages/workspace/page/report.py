@@ -17,12 +17,15 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
+from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import Placing, found_by, placing_of
 from er3a.pipeline.stages.workspace.page.workspace_figures import about, if_normal
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow
 from er3a.pipeline.viewing.page import alternative_table, render_stage, whole_sentence
 from er3a.robots.robot import Robot
+
+LETTERS = 0.065  # of the reach, in the view from above
 
 
 def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
@@ -50,6 +53,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         output,
         answer,
         labelled=_labelled(arms, floor_of(study.scene(instead or stored.robot, "capability")), contradicted),
+        plan=from_above(robot, results, scene, placing.tray, LETTERS) if placing else "",
         turning=workspace_figures.in_space(robot, results, scene, trays, [row.mark for row in rows]),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
@@ -77,7 +81,6 @@ def _answer(
     in_order = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     volume, voids = summary.volume_m3, [_void_as_row(*each) for each in in_order]
     rest, fix = "", None
-    counted = tr("Voids: {count}.", count=len(voids)) if voids else ""
     if placing and rows[0].mark == "pass":
         tray = placing.tray
         centre = millimetres(tray.place.centre_m)
@@ -92,8 +95,7 @@ def _answer(
         payload,
     ]
     groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
-    below = joined([counted, tr("Distances are from axis 1.")], " ")
-    return Answer(whole_sentence(reaches(summary)), rest, below, keys, groups, fix)
+    return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups, fix)
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:

@@ -162,7 +162,7 @@ def labelled(
     ----------
     arms : what is proven of each
     floor_mm : height of the floor in the base's frame; None where there is none
-    contradicted : whether the table of the last arm is: that arm is red, and what it reaches has the names
+    contradicted : whether the table of the last arm is: that arm is red
 
     Returns
     -------
@@ -176,8 +176,7 @@ def labelled(
         arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
         lines = border_lines(border.arc, border.rho_m, border.z_m)
         seen.append(SeenArm(own_title(robot.title), reaches(summary) if arms[1:] else "", kind, arm, lines))
-        if kind == "wrong" or not contradicted:
-            labels += void_labels(summary, kind)
+        labels += void_labels(summary, kind)
         if arms[1:]:  # what the wrong one reaches would make both arms small
             continue
         outer = np.concatenate(lines)
