@@ -116,7 +116,7 @@ NEVER: Mapping[str, str] = words(
         "trajectory": (
             "Never checked: torques, the ways between paths, real shapes, and how a controller rounds and ramps."
         ),
-        "collision": "Never checked: real shapes; links where a joint joins them; what lies between samples.",
+        "collision": "Never checked: real shapes; links where a joint joins them; joint space between samples.",
         "dynamics": "Never checked: heat, wear, elasticity, and what drives can do at speed.",
         "vision": "Never checked: the detector, the part in the gripper, and torques.",
         "programs": (

@@ -34,7 +34,7 @@ from er3a.pipeline.messages.numbers import (
 )
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text
+from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text, not_checked
 from er3a.pipeline.results import (
     AbsentResults,
     Provenance,
@@ -246,6 +246,11 @@ class Head:
     def gaps(self) -> list[str]:
         """Why checks that the verdict needs don't cover all."""
         return [gap_text(gap) for each in self.summary.verdict.missed for gap in each.gaps]
+
+    @property
+    def missed(self) -> str:
+        """Which checks don't cover all, and why."""
+        return not_checked(tuple(each for each in self.summary.checked if not each.complete))
 
     @property
     def banner(self) -> str:
