@@ -80,7 +80,7 @@ SIGNS = {
         re.I,
     ),
     "standard": re.compile(
-        r"(?:standard|classic\w*)[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*standard|stddh|标准|"
+        r"(?:standard|classic\w*)[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*standard|stddh|(?<![a-z])sdh(?![a-z])|标准|"
         r"[\"'](?:standard|classic|normal)[\"']|"
         r"\b[ar](?:_?i)?\s*\*\s*(?:\w+\.)*(?:cos\([^\n,;*]{0,30}(?:th|θ|q)|ct\b)|"
         r"(?:cos\([^\n,;*]{0,30}(?:th|θ|q)[^\n,;*]{0,9}\)|\bct)\s*\*\s*(?:[\w\]]+\.)*[ar](?:_?i)?\b",
@@ -214,7 +214,7 @@ def _differ(one: Grid, other: Grid) -> bool:
     found = []
     for (_, header), *rows in (one, other):
         pairs = (pair for _, row in rows for pair in zip(header, row))
-        cells = " ".join(cell for name, cell in pairs if {"a", "d"}.intersection(quantities_of([name])))
+        cells = " ".join(cell for name, cell in pairs if quantities_of([name]) in (["a"], ["d"]))
         found.append({each.strip("0") for each in re.findall(r"(?<!\w)\d+", cells.replace(".", ""))})
     return bool(found[0] - found[1] and found[1] - found[0])
 
@@ -251,9 +251,8 @@ def nearest_headings(text: str) -> str:
     rows = [row for _, grid in line_grids(text) for row in grid]
     line, cells = max(rows, key=lambda row: len({*quantities_of(row[1])}), default=(0, []))
     found = quantities_of(cells)
-    missing = ", ".join(sorted(NEEDED.difference(found)))
-    rest = f"none of {missing}" if missing else "no rows of a table follow"
-    return f"line {line} has headings of {', '.join(found)}, and {rest}" if len({*found}) > 1 else ""
+    missing = ", ".join(sorted(NEEDED.difference(found))) or "rows below"
+    return f"line {line} has headings of {', '.join(found)}, and lacks {missing}" if len({*found}) > 1 else ""
 
 
 # Where the table is ---------------------------------------------------------------------------------------------------
@@ -365,11 +364,10 @@ def _stacked(text: str) -> list[Grid]:
 def _turned(grid: Grid) -> list[Grid]:
     """A table whose rows are what columns usually are."""
     rows = [(line, cells) for line, cells in grid if len(cells) > 2 and heading_of(cells[0])]
-    sizes = {len(cells) for _, cells in rows}
-    numbers = [_numeric(cells[1:]) for _, cells in rows]
-    if not is_printed_table(cells[0] for _, cells in rows) or len(sizes) > 1 or not all(numbers):
+    if not is_printed_table(cells[0] for _, cells in rows) or not all(_numeric(cells[1:]) for _, cells in rows):
         return []
-    return [[(rows[0][0], list(column)) for column in zip(*(cells for _, cells in rows))]]
+    alike = len({len(cells) for _, cells in rows}) == 1
+    return [[(rows[0][0], list(column)) for column in zip(*(cells for _, cells in rows))]] * alike
 
 
 def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
