@@ -82,10 +82,11 @@ def _puts_in(found: re.Match[str], name: str, table: Grid) -> bool:
 
 
 _SET = (
-    r"(?m)(?:^|;)[ \t]*(?:del[ \t]+NAME\b|NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
-    r"[ \t]*((?:\.\w+|[\[({][^\n=\])}]*[\])}])*)[ \t]*([-+*/]?)=(?!=|[^\n;]*,[ \t\r]*(?:\w+[ \t]*=|\n))([^\n;]*)))"
+    r"(?m)(?:(?<![(,]\n)(?<![(,]\r\n)^|;)[ \t]*(?:del[ \t]+NAME\b|NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
+    r"[ \t]*((?:\.\w+|[\[({][^\n=\])}]*[\])}])*)[ \t]*([-+*/]?)=(?!=)([^\n;]*)))"
 )
-"""A statement that puts something into a list, or gives its name to something else; no argument ``d=d[j], ...``."""
+"""A statement that puts something into a list, or gives its name to something else; no argument
+``d=d[j]`` on a line of its own."""
 
 
 _CONVERTED = re.compile(r"\s*(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\(", re.I)

@@ -818,6 +818,7 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         ("a = [0, 0.27]\nalpha = np.flip([0, -pi/2])\nd = [0.29, 0]\n", "changes 'alpha'"),
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\na.append(0.1)\n", "changes 'a'"),
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0, 0]\nd[0] = L1\n", "changes 'd'"),
+        ("a = [0 270];\nalpha = [-pi/2 0];\nd = [290 0];\na = a/1000, d = d/1000\n", "changes 'a'"),
         (f"# theta d a alpha\n{MATRIX}DH[0][1] = L1\n", "changes 'DH'"),
         (f"# theta d a alpha\n{MATRIX}DH[0][0] = q[0]\nDH[1][0] = q[1]\n", "changes 'DH'"),
         (f"# theta d a alpha\n{MATRIX}DH[1][0] -= q[1]\n", "changes 'DH'"),
