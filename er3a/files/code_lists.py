@@ -43,11 +43,13 @@ def named_lists(code: Code) -> Iterator[NamedList]:
         )
         if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
             continue
-        after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+|=(?!=))?", code.text[group.end + 1 :])
-        if after and after[1] == "=":  # the type of what follows
+        factor = re.findall(r"\A[)\s]*'?\s*([*/][^;,\n]+|=(?!=))?", code.text[group.end + 1 :])[0]
+        if factor == "=":  # the type of what follows
             continue
         cells = row_cells(inside.replace(";", ",").replace("\n", " "))
-        cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
+        if len(cells) == 1 and (often := re.fullmatch(r"\*\s*(\d\d?)\s*", factor)):  # Python's [0.0] * 6
+            cells, factor = cells * int(often[1]), ""
+        cells = [f"({cell}){factor}" if factor else cell for cell in cells]
         yield name[1], cells, code.line(group.start), name[2]
 
 
@@ -56,8 +58,7 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
     columns: dict[str, NamedList] = {}  # heading, cells, line, the list's name
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s?)|s)$", "", name)
-        bare = re.sub(r"^t\d?$", "theta", bare)
-        names = (name, bare, bare.rpartition("_")[2])
+        names = (name, re.sub(r"^t\d?$", "theta", bare), bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
         quantity = heading.quantity if heading else name
         if quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
@@ -91,7 +92,8 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
         )
     titles, lengths, places, _ = zip(*columns.values())
     entries = dict(zip(columns, map(len, lengths)))
-    used = {*map(int, re.findall(_USED_VALUE, program))}  # q[0] to q[6] with eight rows: one of these is fixed
+    used = {*re.findall(r"(?<![\w.])(?:q|thetas?|joints|joint_angles)[\[(](\d+)[\])]", program)}
+    # q[0] to q[6] with eight rows: one of these is fixed
     if "theta" not in entries and len(used) == len(lengths[0]) - 1 > 1:
         entries["values of joints"] = len(used)
     if len({*entries.values()}) > 1:
@@ -112,9 +114,6 @@ _SUMMED = (
     r"\bNAME\s*\+\s*VALUES(?!\s*[*/.\w\[(])|(?<![\w.])VALUES\s*\+\s*NAME\b"
 ).replace("VALUES", "(?:q|theta|thetas|joints|joint_angles)")
 """A list that is added to values of joints, as a whole or one by one."""
-
-
-_USED_VALUE = r"(?<![\w.])(?:q|thetas?|joints|joint_angles)[\[(](\d+)[\])]"
 
 
 _OF_VECTORS = words_of("a alpha d theta offset type direction pose")

@@ -1014,6 +1014,11 @@ def test_a_row_whose_joint_slides_is_none_to_leave_out(tmp_path):
     assert [(row.type, row.a_mm) for row in content.dh.rows] == [("revolute", 300), ("prismatic", 0)]
 
 
+def test_a_list_may_be_one_number_as_often_as_there_are_joints(tmp_path):
+    content, _ = read(tmp_path, "d = [0.29, 0, 0.1]\na = [0.2] * 3\nalpha = [-pi/2, pi/2, 0]\n")
+    assert [row.a_mm for row in content.dh.rows] == [200, 200, 200]
+
+
 def test_whole_numbers_say_nothing_of_inches(tmp_path):
     content, _ = read(tmp_path, "% theta d a alpha\nM = [0 130 0 0;\n 0 0 sqrt(144^2 + 58^2) 0;\n 0 0 144 0];\n")
     assert content.dh.rows[0].d_mm == pytest.approx(130)
