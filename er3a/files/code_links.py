@@ -162,18 +162,12 @@ def _arguments(function: str, text: str) -> Cells | None:
     """A row's cells by their headings; None if the call makes no link."""
     low, toolbox = function.lower(), _TOOLBOX.fullmatch(function)
     given, words, cells = Words(), Words(), Cells()
-    pending = ""
-    for part in parts(text):
+    for part in parts(_NAMED_BEFORE.sub(r"\1=", text)):
         key, is_named, value = part.partition("=")
-        quoted = re.fullmatch(r"""["'](\w*)["']""", part)
         if is_named and re.fullmatch(r"\w+\s*", key):
             cells[_argument(key)] = value.strip(" \"'")
-        elif pending:
-            cells[pending], pending = part, ""
         elif _FLAGS.fullmatch(word := part.strip("\"'")):
             words.append(word.lower())
-        elif quoted:
-            pending = _argument(quoted[1])
         elif part:
             given.append(part)
     if toolbox is None:
@@ -199,6 +193,8 @@ def _argument(key: str) -> str:
 
 
 _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
+_NAMED_BEFORE = re.compile(rf"""["'](?!(?:{_FLAGS.pattern})["'])(\w*)["']\s*,\s*(?=\S)""", re.I)
+"""A name of MATLAB's that stands before its value."""
 
 
 def _of_toolbox(function: str, words: Words, cells: Cells) -> Cells:

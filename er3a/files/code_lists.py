@@ -33,21 +33,23 @@ def named_lists(code: Code) -> Iterator[NamedList]:
     for group in code.groups:
         name = re.search(
             r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?\]?(?:\[\d*\]|\(1:\w+\))?\s*(?::(?: *\[\w+; *\d+\] *|[^=:\n\"'\d]*)(?==))?"
-            r"([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[\d*\]\w+)?[\"']?$",
+            r"([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[[\d.]*\]\w+)?[\"']?$",
             group.before,
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
-            r"[\[{:%]|(?<!\w)\([^()]*,|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
+            r"^\.+$|[\[{:%]|(?<!\w)\([^()]*,|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
             re.sub(r"\w\[[^\[\]]*\]|\w+::", "q", closed_up(inside)),
         )
         if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
             continue
-        after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+|=(?!=))?", code.text[group.end + 1 :])
-        if after and after[1] == "=":  # the type of what follows
+        factor = re.findall(r"\A[)\s]*'?\s*([*/][^;,\n]+|=(?!=))?", code.text[group.end + 1 :])[0]
+        if factor == "=":  # the type of what follows
             continue
         cells = row_cells(inside.replace(";", ",").replace("\n", " "))
-        cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
+        if len(cells) == 1 and (often := re.fullmatch(r"\*\s*(\d\d?)\s*", factor)):  # Python's [0.0] * 6
+            cells, factor = cells * int(often[1]), ""
+        cells = [f"({cell}){factor}" if factor else cell for cell in cells]
         yield name[1], cells, code.line(group.start), name[2]
 
 
@@ -55,8 +57,8 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
     """A table of columns by the names of their lists: ``a = [0, 0.27, ...]``, ``"a": [0, ...]``; theta is no pose."""
     columns: dict[str, NamedList] = {}  # heading, cells, line, the list's name
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
-        bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s)|s)$", "", name))
-        names = (name, bare, bare.rpartition("_")[2])
+        bare = re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s?)|s)$", "", name)
+        names = (name, re.sub(r"^t\d?$", "theta", bare), bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
         quantity = heading.quantity if heading else name
         if quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
@@ -89,11 +91,14 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
             "Name it offset if theta = q + offset, or remove it",
         )
     titles, lengths, places, _ = zip(*columns.values())
-    if len({*map(len, lengths)}) > 1:
-        entries = ", ".join(f"{name} {len(cells)}" for name, (_, cells, _, _) in columns.items())
-        raise InputError(
-            None, f"line {max(places)}", f"different numbers of entries: {entries}", "Give one for each joint"
-        )
+    entries = dict(zip(columns, map(len, lengths)))
+    used = {*re.findall(r"(?<![\w.])(?:q|thetas?|joints|joint_angles)[\[(](\d+)[\])]", program)}
+    # q[0] to q[6] with eight rows: one of these is fixed
+    if "theta" not in entries and len(used) == len(lengths[0]) - 1 > 1:
+        entries["values of joints"] = len(used)
+    if len({*entries.values()}) > 1:
+        problem = "different numbers of entries: " + ", ".join(f"{name} {number}" for name, number in entries.items())
+        raise InputError(None, f"line {max(places)}", problem, "Give one for each joint")
     return [[(0, [*titles]), *((1, list(row)) for row in zip(*lengths))]]
 
 
@@ -104,8 +109,11 @@ _USED = re.compile(
 """Symbols that are entries of a matrix, or a sum with a joint's variable."""
 
 
-_SUMMED = r"\bNAME[\[(]\w+[\])]\s*\+\s*\w*(?:q|th|joint)|(?:q|th\w*|joint\w*)[\[(]\w+[\])]\s*\+\s*NAME\b"
-"""A list that is added to values of joints."""
+_SUMMED = (
+    r"\bNAME[\[(]\w+[\])]\s*\+\s*\w*(?:q|th|joint)|(?:q|th\w*|joint\w*)[\[(]\w+[\])]\s*\+\s*NAME\b|"
+    r"\bNAME\s*\+\s*VALUES(?!\s*[*/.\w\[(])|(?<![\w.])VALUES\s*\+\s*NAME\b"
+).replace("VALUES", "(?:q|theta|thetas|joints|joint_angles)")
+"""A list that is added to values of joints, as a whole or one by one."""
 
 
 _OF_VECTORS = words_of("a alpha d theta offset type direction pose")
@@ -161,13 +169,20 @@ _REFERENCE = re.compile(rf"(?<![\w.'\"@])([^\W\d]\w*)((?:{_INDEX.pattern})+)")
 _LENGTH = re.compile(r"(?:len|size|length|numel|height)\(\s*(\w+)\b(?:[^()]|\([^()]*\))*\)|(\w+)\.shape\[0\]")
 
 
-_RANGE = re.compile(r"range\((?:(\d+), *)?(\w+)\)|(\d+)[ ]*:[ ]*(\w+)|(\d+);[^;<]*<(=?)[ ]*(\w+);.*")
-
-
-_COUNT = re.compile(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?[ \t]*$")
+_RANGE = re.compile(r"(?:range\(|(?=\d+ *[:;]))(?:(\d+) *(,|:|;[^;<]*<=?) *)?(\w+)(?:\)|;.*)?")
 
 
 _LANGUAGE = r"(?m)^\s*end\b|\b(?:import|def|range|zip|np|float|double|const|let|var|auto|self)\b"
+
+
+def _set_in(body: str) -> Cells:
+    """What the statements of a loop make of names; a name among several is a part, ``value@2``."""
+    named = Cells()
+    for names, value in PART.findall(body):
+        value = value if re.fullmatch(r"[\w.\[\]]+", value) else f"({value})"
+        own = re.findall(r"\w+", names)
+        named |= {name: f"{value}@{k}" if own[1:] else value for k, name in enumerate(own)}
+    return named
 
 
 class Lists:
@@ -193,24 +208,18 @@ class Lists:
         code, passes = self.code.text, [call.inside]
         around = [each for each in self.code.groups if each.start < call.start < call.end < each.end]
         built = [found for each in around if (found := _LOOP.search(code, call.end, each.end))]
-        loops = [
-            (code[loop.end() : call.start], *loop.groups()) for loop in built or _LOOP.finditer(code, 0, call.start)
-        ]
-        for body, target, over in loops[-1:] or [("", "i", "n")]:
-            names, over = re.findall(r"\w+", target), over.strip(" :{")
-            named = Cells()
-            for row in PART.finditer(body):
-                value = row[2] if re.fullmatch(r"[\w.\[\]]+", row[2]) else f"({row[2]})"
-                own = re.findall(r"\w+", row[1])
-                named |= {name: f"{value}@{k}" if own[1:] else value for k, name in enumerate(own)}
-            text = filled(call.inside, named)
-            outside = re.search(r"\b(?:def|function)\b", body) or not {*names} & {*re.findall(r"\w+", text)}
-            if built or not outside:
-                branch = re.search(r"\bif\b", f"{body} {over}")
-                made = [] if branch else [filled(text, each) for each in self._passes(text, names, over)]
-                # A loop over poses or time goes through no list.
-                passes = made or ([] if loops and {*re.findall(r"\w+", text)} & {*self.values} else passes)
-                self.loops += {each[1] for each in _REFERENCE.finditer("".join(passes[:1])) if each[1] in self.values}
+        loops = built or [*_LOOP.finditer(code, 0, call.start)]
+        target, over = loops[-1].groups() if loops else ("i", "n")
+        body = code[loops[-1].end() : call.start] if loops else ""
+        names, over = re.findall(r"\w+", target), over.strip(" :{")
+        text = filled(call.inside, _set_in(body))
+        own = {*re.findall(r"\w+", text)}
+        if built or (own.intersection(names) and not re.search(r"\b(?:def|function)\b", body)):
+            branch = re.search(r"\bif\b", f"{body} {over}")
+            made = [] if branch else [filled(text, each) for each in self._passes(text, names, over)]
+            # A loop over poses or time goes through no list.
+            passes = made or ([] if loops and own & {*self.values} else passes)
+            self.loops += {each[1] for each in _REFERENCE.finditer("".join(passes[:1])) if each[1] in self.values}
         return [self.resolved(each).lstrip("*") for each in passes]
 
     def resolved(self, text: str) -> str:
@@ -221,15 +230,15 @@ class Lists:
         """What the names of a loop stand for in each pass; a row may be unpacked into the last ones. If an unknown name
         says how many passes there are, they go through all of the lists that a call takes."""
         counts = {name: len(value) for name, value in self.values.items()}
-        known = dict(_COUNT.findall(self.code.text))
-        bounds = _LENGTH.sub(lambda found: str(counts.get(found[1] or found[2], "n")), over)
-        ranged = _RANGE.fullmatch(re.sub(r"[^\W\d]\w*", lambda found: known.get(found[0], found[0]), bounds))
+        known = {name: value for name, value in PART.findall(self.code.text) if value.isdigit()}
+        bounds = filled(_LENGTH.sub(lambda found: str(counts.get(found[1] or found[2], "n")), over), known)
+        ranged = _RANGE.fullmatch(bounds)
         lists = [] if ranged else [name for name in re.findall(r"\w+", over) if name in counts]
         every = min([counts[name] for name in lists or re.findall(r"\w+", text) if name in counts], default=0)
         first, last = 0, every if re.match(r"enumerate\(|zip\(|[\w.]+$", over) else 0
         if ranged:
-            first, end = int(ranged[1] or ranged[3] or ranged[5] or 0), ranged[2] or ranged[4] or ranged[7]
-            last = int(end) + bool(ranged[3] or ranged[6]) if end.isdigit() else first + every
+            first, end = int(ranged[1] or 0), ranged[3]
+            last = int(end) + ((ranged[2] or ",")[-1] in ":=") if end.isdigit() else first + every
         for k in range(first, min(last, MOST_PASSES)):
             found = [str(k)] * ("enumerate(" in over or not lists) + [f"{name}@{k}" for name in lists]
             rest = [f"{found[-1]}@{part}" for part in range(len(names) - len(found) + 1)]
@@ -238,17 +247,16 @@ class Lists:
     def _element(self, found: re.Match[str]) -> str:
         """An element of a list, or a row of a matrix; what is no list stays as it is."""
         value: Any = self.values.get(found[1])
-        key = "-"
         try:
             for index in _INDEX.findall(found[2]):
                 for part in parts(index[1:-1]) if index[0] in "[({" else [index]:
-                    key = part.strip("'\"@.").lower()
+                    key: Any = part.strip("'\"@.").lower()
                     if isinstance(value, list) and key != ":":
-                        key = str(int(amount_of(key).number) - {"[": self.first, "@": 0}.get(index[0], 1))
-                    value = value if key == ":" else value[int(key) if isinstance(value, list) else key]
+                        key = int(amount_of(key).number) - {"[": self.first, "@": 0}.get(index[0], 1)
+                        value = value[key] if key >= 0 else {}[key]
+                    elif key != ":":
+                        value = value[key]
         except (KeyError, IndexError, ValueError, TypeError):
-            key = "-"
-        if key[0] == "-":
             return found[0]
         self.taken.add(found[1])
         if isinstance(value, str):

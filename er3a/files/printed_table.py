@@ -80,7 +80,7 @@ SIGNS = {
         re.I,
     ),
     "standard": re.compile(
-        r"(?:standard|classic\w*)[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*standard|stddh|标准|"
+        r"(?:standard|classic\w*)[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*standard|stddh|(?<![a-z])sdh(?![a-z])|标准|"
         r"[\"'](?:standard|classic|normal)[\"']|"
         r"\b[ar](?:_?i)?\s*\*\s*(?:\w+\.)*(?:cos\([^\n,;*]{0,30}(?:th|θ|q)|ct\b)|"
         r"(?:cos\([^\n,;*]{0,30}(?:th|θ|q)[^\n,;*]{0,9}\)|\bct)\s*\*\s*(?:[\w\]]+\.)*[ar](?:_?i)?\b",
@@ -202,9 +202,7 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
         return None
     tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]
     if len(tables) > 1:
-        problem = (
-            f"{len(tables)} D-H tables, at lines {' and '.join(str(one[0][0] or one[1][0]) for one in tables[:2])}"
-        )
+        problem = f"{len(tables)} D-H tables, at lines {' and '.join(str(t[0][0] or t[1][0]) for t in tables[:2])}"
         raise InputError(path, None, problem, "Give a file with one of them")
     return _Table(path, text, tables[0], from_code).converted()
 
@@ -213,9 +211,8 @@ def _differ(one: Grid, other: Grid) -> bool:
     """Whether each of two tables has a length that the other lacks, in whatever unit: their digits are compared."""
     found = []
     for (_, header), *rows in (one, other):
-        pairs = (pair for _, row in rows for pair in zip(header, row))
-        cells = " ".join(cell for name, cell in pairs if {"a", "d"}.intersection(quantities_of([name])))
-        found.append({each.strip("0") for each in re.findall(r"(?<!\w)\d+", cells.replace(".", ""))})
+        own = (cell for _, row in rows for name, cell in zip(header, row) if quantities_of([name]) in (["a"], ["d"]))
+        found.append({each.strip("0") for each in re.findall(r"(?<!\w)\d+", " ".join(own).replace(".", ""))})
     return bool(found[0] - found[1] and found[1] - found[0])
 
 
@@ -248,12 +245,11 @@ def is_printed_table(header: Iterable[str]) -> bool:
 def nearest_headings(text: str) -> str:
     """The line of a text with most headings of a D-H table, and what is missing among them, in words; "" if no line has
     two."""
-    rows = [row for _, grid in line_grids(text) for row in grid]
+    rows = (row for _, grid in line_grids(text) for row in grid)
     line, cells = max(rows, key=lambda row: len({*quantities_of(row[1])}), default=(0, []))
     found = quantities_of(cells)
-    missing = ", ".join(sorted(NEEDED.difference(found)))
-    rest = f"none of {missing}" if missing else "no rows of a table follow"
-    return f"line {line} has headings of {', '.join(found)}, and {rest}" if len({*found}) > 1 else ""
+    missing = ", ".join(sorted(NEEDED.difference(found))) or "rows below"
+    return f"line {line} has headings of {', '.join(found)}, and lacks {missing}" if len({*found}) > 1 else ""
 
 
 # Where the table is ---------------------------------------------------------------------------------------------------
@@ -347,8 +343,8 @@ def _with_names(table: Grid) -> Grid:
 
 def _stacked(text: str) -> list[Grid]:
     """A table that was copied with each cell on a line of its own, as far as its rows are a table's."""
-    lines = enumerate(without_latex(plain(text)).split("\n"), 1)
-    cells = [(number, line.strip()) for number, line in lines if line.strip()]
+    lines = without_latex(plain(text)).split("\n")
+    cells = [(number, line.strip()) for number, line in enumerate(lines, 1) if line.strip()]
     titles = "".join("t" if heading_of(cell) else " " for _, cell in cells)
     for found in re.finditer("t{4,}", titles):
         width, first = len(found[0]), found.start()
@@ -365,11 +361,10 @@ def _stacked(text: str) -> list[Grid]:
 def _turned(grid: Grid) -> list[Grid]:
     """A table whose rows are what columns usually are."""
     rows = [(line, cells) for line, cells in grid if len(cells) > 2 and heading_of(cells[0])]
-    sizes = {len(cells) for _, cells in rows}
-    numbers = [_numeric(cells[1:]) for _, cells in rows]
-    if not is_printed_table(cells[0] for _, cells in rows) or len(sizes) > 1 or not all(numbers):
+    if not is_printed_table(cells[0] for _, cells in rows) or not all(_numeric(cells[1:]) for _, cells in rows):
         return []
-    return [[(rows[0][0], list(column)) for column in zip(*(cells for _, cells in rows))]]
+    alike = len({len(cells) for _, cells in rows}) == 1
+    return [[(rows[0][0], list(column)) for column in zip(*(cells for _, cells in rows))]] * alike
 
 
 def _with_lists(path: Path, text: str, grid: Grid) -> Grid:

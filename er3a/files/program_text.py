@@ -40,10 +40,10 @@ _AS_RECORDS = (
 _STREAMED = re.compile(r"<<([^;<>]{0,5000});")  # into a matrix of Eigen
 
 
-_FIELD = r"(?:(?:double|float|\w+_t)\s+)?(\w+)\s*(?:;|:\s*(?:float|f32|f64|double)\b)"
+_FIELD = r"(?:(?:double|float|\w+_t)\s+)?(\w+)\s*(?:=[^;\n]*)?(?:;|:\s*(?:float|f32|f64|double)\b)"
 
 
-_TYPE = re.compile(rf"(?:struct|class)\s+(\w*)[^{{}}\n]*[{{:]?\s*(?:(?:{_FIELD})[^\n]*\s*){{3,8}}(?:\}}\s*(\w*))?")
+_TYPE = re.compile(rf"(?:struct|class)\s+(\w*)[^{{}}\n]*\s*[{{:]?\s*(?:(?:{_FIELD})[^\n]*\s*){{3,8}}(?:\}}\s*(\w*))?")
 """A type whose fields are numbers: in C its name may follow."""
 
 
@@ -169,7 +169,7 @@ def is_row(cells: Iterable[str]) -> bool:
 
 
 PART = re.compile(
-    r"(?m)(?:^|[;{])[ \t]*(?:(?:const|float|double|auto|let|var)[ \t]+)*"
+    r"(?m)(?:^|[;{])[ \t]*(?:(?:const|int|float|double|auto|let|var)[ \t]+)*"
     r"\(?(\w+(?:[ \t]*,[ \t]*\w+)*)\)?[ \t]*=(?!=)[ \t]*([^=;\n]*[^=;\s])"
 )
 

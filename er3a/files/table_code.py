@@ -82,10 +82,11 @@ def _puts_in(found: re.Match[str], name: str, table: Grid) -> bool:
 
 
 _SET = (
-    r"(?m)(?:^|;)[ \t]*(?:del[ \t]+NAME\b|NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
+    r"(?m)(?:(?<![(,]\n)(?<![(,]\r\n)^|;)[ \t]*(?:del[ \t]+NAME\b|NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
     r"[ \t]*((?:\.\w+|[\[({][^\n=\])}]*[\])}])*)[ \t]*([-+*/]?)=(?!=)([^\n;]*)))"
 )
-"""A statement that puts something into a list, or gives its name to something else."""
+"""A statement that puts something into a list, or gives its name to something else; no argument
+``d=d[j]`` on a line of its own."""
 
 
 _CONVERTED = re.compile(r"\s*(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\(", re.I)
@@ -152,11 +153,8 @@ def _titled(code: Code, rows: Grid, labels: Words, before: str = "") -> Grid:
 def _symbols(rows: Grid) -> Words:
     """The names of columns that all symbols in them have, ``theta1 d1 0 pi/2`` and ``theta2 0 a2 0``; [] if one has
     none, or several."""
-    columns = [" ".join(cells) for cells in zip(*(cells for _, cells in rows))]
-    columns = [
-        re.sub(r"^[^a-zA-Zθα]*(?:\w+\.)?(?:pi|π).*", "alpha1", text) if not re.search(r"[^\W\d_]_?\d", text) else text
-        for text in columns
-    ]
-    found = [{*re.findall(r"(?<![^\W\d_])(?![lL]_?\d)[^\W\d_]+(?=_?\d+\b)", text)} for text in columns]
-    names = ["".join(each) if len(each) == 1 else "" for each in found]
+    of_pi = r"^(?!.*[^\W\d_]_?\d)[^a-zA-Zθα]*(?:\w+\.)?(?:pi|π).*"
+    columns = (re.sub(of_pi, "alpha1", " ".join(cells)) for cells in zip(*(cells for _, cells in rows)))
+    found = ({*re.findall(r"(?<![^\W\d_])(?![lL]_?\d)[^\W\d_]+(?=_?\d+\b)", text)} for text in columns)
+    names = [each.pop() if len(each) == 1 else "" for each in found]
     return names if names_columns(names) else []

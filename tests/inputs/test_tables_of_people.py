@@ -337,7 +337,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "M = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\nT = row(a=M[0][0], alpha=M[0][1], d=M[0][2], theta=M[0][3] - q)",
             "--column",
         ),
-        ("i,length a,offset d,theta\n1,0,0,q1\n", "none of alpha"),
+        ("i,length a,offset d,theta\n1,0,0,q1\n", "lacks alpha"),
         ('{"dh": [[0, 321.5, 50, -90], [-90, 0, 270, 0]]}', "--column"),
         ("M = [0 0 0.3 0;\n 0.2 0 0 0];\nsetFixedTransform(j, trvec2tform(M(1,1:3)));", "--column"),
         (
@@ -705,6 +705,14 @@ IN_MATLAB = "DH = [0 0.29 0 -pi/2 0 0;\n 0 0 0.27 0 0 -pi/2];\n"
         "for i in range(2):\n    T = T @ row(q[i] - i * pi / 2, x[i], y[i], z[i])\n",
         "l = [29, 27];\nDH = [0 l(1)/100 0 -pi/2;\n -pi/2 0 l(2)/100 0];\nfor i = 1:2\n"
         "  L(i) = Link('d', DH(i,2), 'a', DH(i,3), 'alpha', DH(i,4), 'offset', DH(i,1));\nend\n",
+        f"{LISTS}for i in range(2):\n    one = RevoluteDH(\n"
+        "        d=d[i], a=a[i], alpha=alpha[i], offset=off[i]\n    )\n",
+        f"{LINES}theta = [0, -pi/2]\nq = theta + q\n",
+        "a_value = [0 0.27];\nalpha_value = [-pi/2 0];\nd_value = [0.29 0];\ntheta_value = [q1 q2-pi/2];\n",
+        "AValues: [...]float64{0, 0.27},\nAlphaValues: [...]float64{-math.Pi/2, 0},\nDValues: [...]float64{0.29, 0},\n"
+        "ThetaOffsets: [...]float64{0, -math.Pi/2},\n",
+        "struct Row\n{\n  double a = 0.0;\n  double alpha = 0.0;\n  double d = 0.0;\n  double thetaOffset = 0.0;\n};\n"
+        "std::vector<Row> rows()\n{\n  return {{0, -M_PI / 2, 0.29, 0},\n          {0.27, 0, 0, -M_PI / 2}};\n}\n",
     ],
 )
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
@@ -810,6 +818,7 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         ("a = [0, 0.27]\nalpha = np.flip([0, -pi/2])\nd = [0.29, 0]\n", "changes 'alpha'"),
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\na.append(0.1)\n", "changes 'a'"),
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0, 0]\nd[0] = L1\n", "changes 'd'"),
+        ("a = [0 270];\nalpha = [-pi/2 0];\nd = [290 0];\na = a/1000, d = d/1000\n", "changes 'a'"),
         (f"# theta d a alpha\n{MATRIX}DH[0][1] = L1\n", "changes 'DH'"),
         (f"# theta d a alpha\n{MATRIX}DH[0][0] = q[0]\nDH[1][0] = q[1]\n", "changes 'DH'"),
         (f"# theta d a alpha\n{MATRIX}DH[1][0] -= q[1]\n", "changes 'DH'"),
@@ -975,6 +984,12 @@ def test_a_convention_by_which_two_joints_turn_about_one_line_is_asked_back(tmp_
             "is no column",
         ),
         ("# alpha, a, d\nM = [[1, 0, 1], [0, 1, 0]]\ntheta_offset = [0, 1]\nq = q - theta_offset\n", "may be offsets"),
+        ("a = [0, 0, 1]\nalpha = [0, 1.57, 0]\nd = [1, 0, 0]\nT = A(q[0]) @ A(q[1])\n", "d 3, values of joints 2"),
+        (f"{LINES}theta = [0, -pi/2]\ntheta = theta + dtheta\n", "may be offsets of the joints' angles, or a pose"),
+        (
+            "SDH (its numbers are those of the MDH)\n\ni,a,alpha,d,theta\n1,0,0,290,q1\n2,270,90,0,q2\n",
+            "says standard and",
+        ),
     ],
 )
 def test_what_a_program_leaves_out_or_a_document_says_twice_is_asked_back(tmp_path, text, names):
@@ -997,6 +1012,11 @@ def test_types_of_joints_may_be_a_list_of_their_own(tmp_path, said):
 def test_a_row_whose_joint_slides_is_none_to_leave_out(tmp_path):
     content, _ = read(tmp_path, "def dh(d, theta, a, alpha):\n  pass\nT = dh(0.2, q[0], 0.3, 0) * dh(q[1], 0, 0, 0)\n")
     assert [(row.type, row.a_mm) for row in content.dh.rows] == [("revolute", 300), ("prismatic", 0)]
+
+
+def test_a_list_may_be_one_number_as_often_as_there_are_joints(tmp_path):
+    content, _ = read(tmp_path, "d = [0.29, 0, 0.1]\na = [0.2] * 3\nalpha = [-pi/2, pi/2, 0]\n")
+    assert [row.a_mm for row in content.dh.rows] == [200, 200, 200]
 
 
 def test_whole_numbers_say_nothing_of_inches(tmp_path):
