@@ -464,6 +464,8 @@ def _held_by_followers(
             continue
         before = (*limits[leader].tolist(), float(speed[leader]))
         least, most = np.sort((np.array([joint.lower, joint.upper]) - offset) / factor)
+        if joint.type == "revolute" and math.isclose(joint.upper - joint.lower, 2 * NO_RANGE, rel_tol=1e-3):
+            least, most = -math.inf, math.inf  # the one turn that files give a joint without stops
         lower, upper = float(np.fmax(before[0], least)), float(np.fmin(before[1], most))
         limits[leader] = (lower, upper) if lower < upper else before[:2]
         if 0 < joint.speed < FASTEST:
