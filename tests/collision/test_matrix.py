@@ -367,6 +367,22 @@ def test_neighbours_of_given_hulls_are_not_looked_at():
     assert row.state == "joined"
 
 
+@pytest.mark.parametrize(("length", "held"), [(0.015, True), (0.05, False)])
+def test_a_margin_is_kept_by_links_that_can_keep_it(length, held):
+    """A bar that turns about two joints beside a wall, 0 to 2 mm from it, or up to 37 mm if the bar is longer."""
+    boxes = (
+        box_around(0, (-0.1, length + 0.002, -0.1), (0.1, length + 0.1, 0.1)),
+        box_around(1, (-0.005, -0.005, -0.005), (0.005, 0.005, 0.005)),
+        box_around(2, (-length, -0.015, -0.05), (length, 0.015, 0.05)),
+    )
+    robot = made_of([("R", 0, 0, 0, -180, 180)] * 2).replace(hulls=boxes)
+    bodies, q = Bodies(robot, None), quasi_random_points(robot.lower, robot.upper, 200)
+    assert rows_of(robot)["base", "link_2"].state == "meets"
+    assert bodies.free(q).any()
+    assert np.array_equal(bodies.free(q, 0.02), bodies.free(q)) == held
+    assert np.isfinite(bodies.min_distance(q)[0][bodies.free(q)]).any() != held
+
+
 def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes():
     """A base in the wrong unit, as a ball of 3 m: the rest of the arm is checked as before."""
     robot = load_robot("er3_600").replace(pair_rules=())
