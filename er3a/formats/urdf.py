@@ -46,6 +46,7 @@ FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
 WRITTEN_RAD = 1e-9  # angles that differ by less are the same, written in all digits of a double
 SHOWN_MM = 1e-4  # that a point of the flange moves by; no controller shows less
+MARKER_M = 2e-3  # across; PR2 has cubes of 1 mm where frames are
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
 
@@ -315,7 +316,7 @@ def link_shapes(
                 made.append(urdf_tree.collision_shape(path, name, collision, place))
             except Er3aError as error:
                 unread.setdefault(name, _said(path, error))
-        shapes += urdf_tree.with_capsules(made)
+        shapes += [each for each in urdf_tree.with_capsules(made) if not _is_marker(each)]
     shapes.sort(key=lambda each: each.link)
     surfaces: dict[int, list[Reals]] = {}
     for shape in shapes:
@@ -331,6 +332,11 @@ def link_shapes(
     if astray:
         notes.append(f"shapes of {urdf_tree.some(astray)} are left out: they do not move with the arm's chain")
     return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
+
+
+def _is_marker(shape: urdf_tree.Shape) -> bool:
+    """Whether a shape is as small as what marks a frame and stands for no body."""
+    return isinstance(shape, ConvexPiece) and float(np.ptp(shape.points, axis=0).max()) < MARKER_M
 
 
 def _said(path: Path, error: Er3aError) -> str:
