@@ -126,8 +126,9 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
     shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
     visuals, unseen = link_visuals(path, root, robot, placed)
-    larger = arm_shapes(robot.replace(**shapes, visuals=visuals)).uncovered if lost else ()
-    have = {shape.link for own in shapes.values() for shape in own} - {*dict(larger)}
+    unread = {at[1] for name in lost if (at := placed(name, False))}
+    larger = arm_shapes(robot.replace(**shapes, visuals=visuals)).uncovered if unread else ()
+    have = {shape.link for own in shapes.values() for shape in own} - unread.intersection(dict(larger))
     seen = tuple(each for each in visuals if each.link not in have)
     shapes["meshes"] += seen
     lost += tuple(link_label(each.link) for each in seen)

@@ -367,20 +367,26 @@ def test_neighbours_of_given_hulls_are_not_looked_at():
     assert row.state == "joined"
 
 
-@pytest.mark.parametrize(("length", "held"), [(0.015, True), (0.05, False)])
-def test_a_margin_is_kept_by_links_that_can_keep_it(length, held):
-    """A bar that turns about two joints beside a wall, 0 to 2 mm from it, or up to 37 mm if the bar is longer."""
+@pytest.mark.parametrize(
+    ("length", "wall", "state", "kept"),
+    [(0.015, 0.016, "joined", True), (0.015, 0.02, "meets", True), (0.05, 0.052, "meets", False)],
+)
+def test_a_margin_is_asked_of_links_that_can_keep_it(length, wall, state, kept):
+    """A bar that turns about two joints beside a wall: at most 1 or 5 mm from it, or, as it is longer, 37 mm.
+
+    The first meets the wall in most joint vectors.
+    """
     boxes = (
-        box_around(0, (-0.1, length + 0.002, -0.1), (0.1, length + 0.1, 0.1)),
+        box_around(0, (-0.1, wall, -0.1), (0.1, wall + 0.1, 0.1)),
         box_around(1, (-0.005, -0.005, -0.005), (0.005, 0.005, 0.005)),
         box_around(2, (-length, -0.015, -0.05), (length, 0.015, 0.05)),
     )
     robot = made_of([("R", 0, 0, 0, -180, 180)] * 2).replace(hulls=boxes)
     bodies, q = Bodies(robot, None), quasi_random_points(robot.lower, robot.upper, 200)
-    assert rows_of(robot)["base", "link_2"].state == "meets"
-    assert bodies.free(q).any()
-    assert np.array_equal(bodies.free(q, 0.02), bodies.free(q)) == held
-    assert np.isfinite(bodies.min_distance(q)[0][bodies.free(q)]).any() != held
+    assert rows_of(robot)["base", "link_2"].state == state
+    assert bodies.free(q).all() == (state == "joined")
+    assert np.array_equal(bodies.free(q, 0.02), bodies.free(q)) == kept
+    assert np.isfinite(bodies.min_distance(q)[0][bodies.free(q)]).any() != kept
 
 
 def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes():

@@ -290,6 +290,12 @@ def test_an_axis_of_any_length_is_a_direction(tmp_path, random):
     np.testing.assert_allclose(forward(import_urdf(written(tmp_path, long)).robot, q), expected, atol=1e-12)
 
 
+@pytest.mark.parametrize(("side", "shapes"), [(0.001, 0), (0.003, 1)])
+def test_a_cube_that_marks_a_frame_is_no_shape(tmp_path, side, shapes):
+    text = urdf(extra=shaped(f'<box size="{side} {side} {side}"/>'))
+    assert len(import_urdf(written(tmp_path, text)).robot.hulls) == shapes
+
+
 def test_a_flat_mesh_is_a_shape(tmp_path):
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n")
     (piece,) = import_urdf(written(tmp_path, urdf(extra=shaped('<mesh filename="flat.obj"/>')))).robot.meshes
