@@ -336,7 +336,7 @@ def link_shapes(
 
 
 def _is_marker(shape: urdf_tree.Shape) -> bool:
-    """Whether a shape is as small as what marks a frame and stands for no body."""
+    """Whether a shape is as small as what marks a frame, and is no body."""
     return isinstance(shape, ConvexPiece) and float(np.ptp(shape.points, axis=0).max()) < MARKER_M
 
 
