@@ -46,7 +46,7 @@ FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
 WRITTEN_RAD = 1e-9  # angles that differ by less are the same, written in all digits of a double
 SHOWN_MM = 1e-4  # that a point of the flange moves by; no controller shows less
-MARKER_M = 2e-3  # across; PR2 has cubes of 1 mm where frames are
+MARKER_M = 2e-3  # across; a PR2 has cubes of 1 mm where frames are, a Magician one of 0.1 mm
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
 
@@ -129,7 +129,7 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     unread = {at[1] for name in lost if (at := placed(name, False))}
     larger = arm_shapes(robot.replace(**shapes, visuals=visuals)).uncovered if unread else ()
     have = {shape.link for own in shapes.values() for shape in own} - unread.intersection(dict(larger))
-    seen = tuple(each for each in visuals if each.link not in have)
+    seen = tuple(each for each in visuals if each.link not in have and not _is_marker(each))
     shapes["meshes"] += seen
     lost += tuple(link_label(each.link) for each in seen)
     names = tuple(joint.name for joint in sources)
@@ -337,7 +337,7 @@ def link_shapes(
 
 def _is_marker(shape: urdf_tree.Shape) -> bool:
     """Whether a shape is as small as what marks a frame, and is no body."""
-    return isinstance(shape, ConvexPiece) and float(np.ptp(shape.points, axis=0).max()) < MARKER_M
+    return not isinstance(shape, Envelope) and float(np.ptp(shape.points, axis=0).max()) < MARKER_M
 
 
 def _said(path: Path, error: Er3aError) -> str:

@@ -292,8 +292,10 @@ def test_an_axis_of_any_length_is_a_direction(tmp_path, random):
 
 @pytest.mark.parametrize(("side", "shapes"), [(0.001, 0), (0.003, 1)])
 def test_a_cube_that_marks_a_frame_is_no_shape(tmp_path, side, shapes):
-    text = urdf(extra=shaped(f'<box size="{side} {side} {side}"/>'))
-    assert len(import_urdf(written(tmp_path, text)).robot.hulls) == shapes
+    cube = shaped(f'<box size="{side} {side} {side}"/>')
+    assert len(import_urdf(written(tmp_path, urdf(extra=cube))).robot.hulls) == shapes
+    drawn = import_urdf(written(tmp_path, urdf(extra=cube.replace("collision", "visual")))).robot
+    assert len(drawn.meshes) == shapes  # a link without a shape is checked as it looks
 
 
 def test_a_flat_mesh_is_a_shape(tmp_path):
