@@ -5,7 +5,7 @@ As MoveIt's setup assistant has it, but that "never" is proven:
 - *joined*: a joint joins the two: no link with a shape is between them, or they are at most ``ACROSS`` joints apart
   and overlap in all joint vectors drawn (``TRIED``), as across a wrist. Hulls and surfaces are not checked then, nor
   those that stay within ``PLAY`` of each other there: what rubs at each joint value is a bearing, and whether it
-  touches by the rounding of a mesh's corners says nothing. Neither are those that overlap in ``MOST``: no arm is built
+  touches by the rounding of a mesh's corners says nothing. Neither are links that overlap in ``MOST``: no arm is built
   like that, so housings, or the stages of a telescope, are drawn too large. Of
   capsules the region around the joint is left out, within the girth of both, from where they are nearest in the pose
   in which they are farthest apart. The rest is checked, so that an arm that folds onto itself is seen;
@@ -161,7 +161,7 @@ def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[Bo
         return MatrixRow(*names, "overlaps", q[0]), []
     if share == 1.0 and capsules:
         return _joined(robot, pairs, overlap)
-    if near and not capsules and (share > MOST or _held(robot, pairs, PLAY)):
+    if near and not capsules and ((own and share > MOST) or _held(robot, pairs, PLAY)):
         return joined
     if near and share >= POOR_GUESS and not arm_shapes(robot).given:
         return MatrixRow(*names, "guessed"), []
