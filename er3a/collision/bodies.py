@@ -6,7 +6,7 @@ The base is not paired with the scene: it does not move, and it is mounted on so
 from __future__ import annotations
 
 from functools import lru_cache
-from itertools import compress, product
+from itertools import product
 
 import numpy as np
 
@@ -56,20 +56,16 @@ class Bodies:
         self.robot, self.scene = robot, scene
         own, carried = arm_bodies(robot), carried_bodies(robot, scene)
         matrix = collision_matrix(robot)
-        watched, joined = list(matrix.watched), list(matrix.joined)
-        self.matrix: tuple[MatrixRow, ...] = matrix.rows
         rules = scene.pair_rules if scene else ()
-        if carried:
-            more = matrix_of(robot, list(product(own, carried)), rules)
-            watched += more.watched
-            joined += more.joined
-            self.matrix += more.rows
+        more = matrix_of(robot, list(product(own, carried)), rules)
+        self.matrix: tuple[MatrixRow, ...] = matrix.rows + more.rows
         moving = [body for body in (*own, *carried) if body.link != BASE]
         solids = [solid_body(solid) for solid in (scene.solids if scene else ())]
         allowed = {frozenset((rule.first, rule.second)) for rule in rules if rule.rule == "allow"}
         around = [(b, s) for s in solids for b in moving if frozenset((b.name, s.name)) not in allowed]
-        kept = [frozenset((a.name, b.name)) not in allowed for a, b in watched]
-        watched, joined = list(compress(watched, kept)), list(compress(joined, kept)) + [False] * len(around)
+        found = zip(matrix.watched + more.watched, matrix.joined + more.joined)
+        kept = [(pair, held) for pair, held in found if frozenset(body.name for body in pair) not in allowed]
+        met = (*(pair for pair, _ in kept), *around)
         numbers = {link_label(k): k for k in range(robot.rows + 1)}
         self.in_error, self.guessed = (
             tuple[Pair, ...](
@@ -81,20 +77,16 @@ class Bodies:
             )
             for state in ("overlaps", "guessed")
         )
-        number: dict[int, int] = {}
-        bodies: list[Body] = []
-        for body in (*(body for pair in watched for body in pair), *moving, *solids):
-            if id(body) not in number:
-                number[id(body)] = len(bodies)
-                bodies.append(body)
-        pairs = [(number[id(a)], number[id(b)]) for a, b in (*watched, *around)]
-        self.all, count = tuple(bodies), len(bodies) - len(solids)
+        links = (body for pair, _ in kept for body in pair)
+        number = {body: k for k, body in enumerate(dict.fromkeys((*links, *moving, *solids)))}
+        self.all, count = tuple(number), len(number) - len(solids)
         self.capsules = self.all[:count]
-        self.layout = layout_of(robot, bodies, pairs, joined)
+        joined = [held for _, held in kept] + [False] * len(around)
+        self.layout = layout_of(robot, self.all, [(number[a], number[b]) for a, b in met], joined)
         self.joined = self.layout.joined
         self.first = self.layout.first
         self.second = np.where(self.layout.second < count, self.layout.second, -1)
-        self.pairs: tuple[Pair, ...] = tuple(named_pair(a, b) for a, b in (*watched, *around))
+        self.pairs: tuple[Pair, ...] = tuple(named_pair(a, b) for a, b in met)
         most = max((len(body.points) for body in self.capsules), default=1)
         rows = [np.resize(np.arange(len(body.points)), most) for body in self.capsules]
         self._padded = np.array([body.points[row] for body, row in zip(self.capsules, rows)]).reshape(-1, most, 3)

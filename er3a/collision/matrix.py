@@ -5,7 +5,8 @@ As MoveIt's setup assistant has it, but that "never" is proven:
 - *joined*: a joint joins the two: no link with a shape is between them, or they are at most ``ACROSS`` joints apart
   and overlap in all joint vectors drawn (``TRIED``), as across a wrist. Hulls and surfaces are not checked then, nor
   those that stay within ``PLAY`` of each other there: what rubs at each joint value is a bearing, and whether it
-  touches by the rounding of a mesh's corners says nothing. Of
+  touches by the rounding of a mesh's corners says nothing. Neither are links that overlap in ``MOST``: no arm is built
+  like that, so housings, or the stages of a telescope, are drawn too large. Of
   capsules the region around the joint is left out, within the girth of both, from where they are nearest in the pose
   in which they are farthest apart. The rest is checked, so that an arm that folds onto itself is seen;
 - *overlaps*: they overlap in all joint vectors drawn and no joint explains it. No arm is built like that, so the shapes
@@ -33,7 +34,7 @@ import numpy as np
 
 from er3a.by_value import by_identity, frozen
 from er3a.collision.distances import FREE, MEETS, Layout, measure, search_boxes, some_distances, which_overlap
-from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED, link_label
+from er3a.collision.pairs import ASSUMED_MARGIN, BASE, PENETRATION_TOLERANCE, TRIED, link_label
 from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_body
 from er3a.numerics.arrays import Flags, Reals
@@ -44,6 +45,7 @@ PairState = Literal["never", "joined", "overlaps", "guessed", "meets", "undecide
 
 ACROSS = 2  # joints that a wrist's housing hides
 POOR_GUESS = 0.1  # of the joint vectors drawn
+MOST = 0.5  # of the joint vectors drawn; of 40 arms, housings overlap in 0.6 or more of them, links that fold in 0.36
 FEW = 8  # of the joint vectors drawn: in one of them most pairs part
 PLAY = 1e-3  # m, between housings that turn in each other
 BOXES = 50_000
@@ -85,7 +87,8 @@ class MatrixRow:
 class CollisionMatrix:
     """The allowed collision matrix: a row for each pair of links, and the pairs of bodies that are checked.
 
-    ``joined`` says of each of these whether it is what is left of two bodies that a joint joins.
+    ``joined`` says of each of these whether only overlap means anything: of what is left of two bodies that a joint
+    joins, and of housings that never part by ``ASSUMED_MARGIN``.
     """
 
     rows: tuple[MatrixRow, ...]
@@ -127,9 +130,7 @@ def matrix_of(robot: Robot, pairs: Sequence[BodyPair], rules: Sequence[PairRule]
         if inner.link < outer.link:
             by_names.setdefault((inner.name, outer.name), []).append((inner, outer))
     decided = {frozenset((rule.first, rule.second)): rule for rule in rules}
-    rows: list[MatrixRow] = []
-    watched: list[BodyPair] = []
-    joined: list[bool] = []
+    rows, watched, joined = list[MatrixRow](), list[BodyPair](), list[bool]()
     for names, bodies in by_names.items():
         rule = decided.get(frozenset(names))
         if rule and rule.rule == "watch":
@@ -141,7 +142,7 @@ def matrix_of(robot: Robot, pairs: Sequence[BodyPair], rules: Sequence[PairRule]
             row, kept = MatrixRow(*names, "allowed", witness, reason=rule.reason, hides=bool(kept)), []
         rows.append(row)
         watched += kept
-        joined += [row.state == "joined"] * len(kept)
+        joined += [row.state == "joined" or (not rule and _held(robot, kept, ASSUMED_MARGIN))] * len(kept)
     return CollisionMatrix(tuple(rows), tuple(watched), tuple(joined))
 
 
@@ -160,11 +161,16 @@ def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[Bo
         return MatrixRow(*names, "overlaps", q[0]), []
     if share == 1.0 and capsules:
         return _joined(robot, pairs, overlap)
-    if near and not capsules and all(_least(robot, pairs, count).max() <= PLAY for count in (FEW, TRIED)):
+    if near and not capsules and ((own and share > MOST) or _held(robot, pairs, PLAY)):
         return joined
     if near and share >= POOR_GUESS and not arm_shapes(robot).given:
         return MatrixRow(*names, "guessed"), []
     return _checked(robot, pairs, q, overlap)
+
+
+def _held(robot: Robot, pairs: Sequence[BodyPair], within: float) -> bool:
+    """Whether bodies of two links stay within a distance (m) of each other in all joint vectors drawn."""
+    return all(_least(robot, pairs, count).max() <= within for count in (FEW, TRIED))
 
 
 def _checked(robot: Robot, pairs: Sequence[BodyPair], q: Reals, overlap: Flags) -> tuple[MatrixRow, list[BodyPair]]:
@@ -172,7 +178,7 @@ def _checked(robot: Robot, pairs: Sequence[BodyPair], q: Reals, overlap: Flags) 
     proven never to meet are to be checked."""
     met = overlap.any(axis=1)
     boxes, witness = (BOXES_MORE, q[met.argmax()]) if met.any() else (BOXES, None)
-    watched, bounds, looked, undecided = [], [np.inf], 0, False
+    watched, bounds, looked = [], [np.inf], 0
     for pair, meets in zip(pairs, np.asarray(overlap.any(axis=0)).tolist()):
         if not meets:
             outcome, at, bound, more = _searched(robot, pair, boxes)
@@ -181,9 +187,8 @@ def _checked(robot: Robot, pairs: Sequence[BodyPair], q: Reals, overlap: Flags) 
                 bounds.append(bound)
                 continue
             witness = at if witness is None and outcome == MEETS else witness
-            undecided |= outcome != MEETS
         watched.append(pair)
-    state: PairState = "never" if not watched else "undecided" if witness is None and undecided else "meets"
+    state: PairState = "never" if not watched else "undecided" if witness is None else "meets"
     bound = np.nan if watched else min(bounds)
     return MatrixRow(pairs[0][0].name, pairs[0][1].name, state, witness, bound, boxes=looked), watched
 

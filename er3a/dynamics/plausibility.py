@@ -44,13 +44,13 @@ def mass_findings(robot: Robot) -> tuple[Finding, ...]:
     armature = drives_of(robot).armature
     moved_by_one = robot.coupling is None
     found: list[Finding] = []
-    for link in range(robot.rows + 1):
+    for link in range(1, robot.rows + 1):  # the base loads no joint
         body = robot.masses.body(link)
         if body is None or not has_mass(body):
-            rotor = moved_by_one and link > 0 and armature[link - 1] > 0
+            rotor = moved_by_one and armature[link - 1] > 0
             # A massless link with mass beyond it is no singular joint: what it carries has inertia about its axis.
             carries = any(has_mass(robot.masses.body(k)) for k in range(link + 1, robot.rows + 1))
-            found += [fact("missing_link", link=link, singular=not rotor and not carries)] if link else []
+            found.append(fact("missing_link", link=link, singular=not rotor and not carries))
         elif problem := no_body(body):
             found.append(fact("impossible_inertia", link=link, why=problem))
         elif body.mass == 0:

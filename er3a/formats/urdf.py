@@ -46,6 +46,7 @@ FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
 WRITTEN_RAD = 1e-9  # angles that differ by less are the same, written in all digits of a double
 SHOWN_MM = 1e-4  # that a point of the flange moves by; no controller shows less
+MARKER_M = 2e-3  # across; a PR2 has cubes of 1 mm where frames are, a Magician one of 0.1 mm
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
 
@@ -125,9 +126,10 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
     shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
     visuals, unseen = link_visuals(path, root, robot, placed)
-    larger = arm_shapes(robot.replace(**shapes, visuals=visuals)).uncovered if lost else ()
-    have = {shape.link for own in shapes.values() for shape in own} - {*dict(larger)}
-    seen = tuple(each for each in visuals if each.link not in have)
+    unread = {at[1] for name in lost if (at := placed(name, False))}
+    larger = arm_shapes(robot.replace(**shapes, visuals=visuals)).uncovered if unread else ()
+    have = {shape.link for own in shapes.values() for shape in own} - unread.intersection(dict(larger))
+    seen = tuple(each for each in visuals if each.link not in have and not _is_marker(each))
     shapes["meshes"] += seen
     lost += tuple(link_label(each.link) for each in seen)
     names = tuple(joint.name for joint in sources)
@@ -315,7 +317,7 @@ def link_shapes(
                 made.append(urdf_tree.collision_shape(path, name, collision, place))
             except Er3aError as error:
                 unread.setdefault(name, _said(path, error))
-        shapes += urdf_tree.with_capsules(made)
+        shapes += [each for each in urdf_tree.with_capsules(made) if not _is_marker(each)]
     shapes.sort(key=lambda each: each.link)
     surfaces: dict[int, list[Reals]] = {}
     for shape in shapes:
@@ -331,6 +333,11 @@ def link_shapes(
     if astray:
         notes.append(f"shapes of {urdf_tree.some(astray)} are left out: they do not move with the arm's chain")
     return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
+
+
+def _is_marker(shape: urdf_tree.Shape) -> bool:
+    """Whether a shape is as small as what marks a frame, and is no body."""
+    return not isinstance(shape, Envelope) and float(np.ptp(shape.points, axis=0).max()) < MARKER_M
 
 
 def _said(path: Path, error: Er3aError) -> str:
@@ -464,6 +471,8 @@ def _held_by_followers(
             continue
         before = (*limits[leader].tolist(), float(speed[leader]))
         least, most = np.sort((np.array([joint.lower, joint.upper]) - offset) / factor)
+        if joint.type == "revolute" and math.isclose(joint.upper - joint.lower, 2 * NO_RANGE, rel_tol=1e-3):
+            least, most = -math.inf, math.inf  # the one turn that files give a joint without stops
         lower, upper = float(np.fmax(before[0], least)), float(np.fmin(before[1], most))
         limits[leader] = (lower, upper) if lower < upper else before[:2]
         if 0 < joint.speed < FASTEST:

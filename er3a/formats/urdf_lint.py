@@ -37,7 +37,6 @@ WRONG = ("urdf_lengths", "urdf_angles", "urdf_limits_reversed", "urdf_inertia", 
 MANY_TURNS = 10 * 2 * math.pi
 NONE = (0.0, 0.0, 0.0)
 AXIS_OFF = 1e-3  # by which an axis' length may differ from 1
-ALIKE = 3  # joints or links whose efforts or masses no maker's arm has alike
 
 Broken = tuple[str, Element, str]
 """A rule, the element that breaks it, and its name or value."""
@@ -94,16 +93,17 @@ def _of_joints(path: Path, root: Element) -> Iterator[Broken]:
         for key in ("velocity", "effort"):
             if joint.find("mimic") is None and not number_of(limit, key) > 0:
                 yield f"urdf_no_{key}", joint, name
-    yield from _alike(moving, [number_of(joint.find("limit"), "effort") for joint in moving], "urdf_efforts_alike")
 
 
 def _of_links(path: Path, root: Element) -> Iterator[Broken]:
     children = {each.get("link") for each in root.findall("joint/child")}
     links = [link for link in root.findall("link") if link.get("name") in children]
-    masses = [number_of(link.find("inertial/mass"), "value") for link in links]
-    yield from _alike(links, masses, "urdf_masses_alike")
-    for link, mass in zip(links, masses):
-        name, inertial = link.get("name", "?"), link.find("inertial")
+    for link in links:
+        name, inertial, mass = (
+            link.get("name", "?"),
+            link.find("inertial"),
+            number_of(link.find("inertial/mass"), "value"),
+        )
         if link.find("visual") is not None:
             if not mass > 0:
                 yield "urdf_no_mass", link, name
@@ -124,10 +124,3 @@ def _of_links(path: Path, root: Element) -> Iterator[Broken]:
             read_link_mesh(file, numbers_of(path, name, mesh, "scale", (1.0, 1.0, 1.0)))
         except InputError as error:
             yield "urdf_mesh_unusable", mesh, f"{name}: {error.problem}"
-
-
-def _alike(elements: list[Element], values: list[float], code: str) -> Iterator[Broken]:
-    """Values above 0 that are all the same."""
-    known = [(element, value) for element, value in zip(elements, values) if value > 0]
-    if len(known) >= ALIKE and len({value for _, value in known}) == 1:
-        yield code, known[0][0], f"{known[0][1]:g}"

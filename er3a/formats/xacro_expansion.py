@@ -106,15 +106,15 @@ def packages_near(path: Path) -> dict[str, Path]:
 
     Returns
     -------
-    folders : the ``FOLDERS_UP`` folders above the file and those in them, by folder name, or by the name in their
-        ``package.xml``; of two with one name the nearer one
+    folders : the ``FOLDERS_UP`` folders above the file and those in them, by folder name; these and those two below,
+        such as packages of another repository in the same workspace, by the name in their ``package.xml``; of two with
+        one name the nearer one
     """
     found: dict[str, Path] = {}
     for above in reversed(path.resolve().parents[:FOLDERS_UP]):
         found |= {folder.name: folder for folder in (*sorted(above.glob("*/")), above)}
-        for manifest in (*sorted(above.glob("*/package.xml")), above / "package.xml"):
-            if manifest.is_file():
-                found[_package_name(manifest)] = manifest.parent
+        for depth in ("*/*/", "*/", ""):
+            found |= {_package_name(each): each.parent for each in sorted(above.glob(f"{depth}package.xml"))}
     return found
 
 

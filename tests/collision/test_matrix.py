@@ -367,6 +367,32 @@ def test_neighbours_of_given_hulls_are_not_looked_at():
     assert row.state == "joined"
 
 
+@pytest.mark.parametrize(
+    ("length", "wall", "state", "kept"),
+    [(0.015, 0.0175, "joined", True), (0.015, 0.02, "meets", True), (0.05, 0.052, "meets", False)],
+)
+def test_a_margin_is_asked_of_links_that_can_keep_it(length, wall, state, kept):
+    """A bar that turns about two joints beside a wall: at most 2.5 or 5 mm from it, or, as it is longer, 37 mm.
+
+    The first meets the wall in most joint vectors.
+    """
+    boxes = (
+        box_around(0, (-0.1, wall, -0.1), (0.1, wall + 0.1, 0.1)),
+        box_around(1, (-0.005, -0.005, -0.005), (0.005, 0.005, 0.005)),
+        box_around(2, (-length, -0.015, -0.05), (length, 0.015, 0.05)),
+    )
+    robot = made_of([("R", 0, 0, 0, -180, 180)] * 2).replace(hulls=boxes)
+    bodies, q = Bodies(robot, None), quasi_random_points(robot.lower, robot.upper, 200)
+    assert rows_of(robot)["base", "link_2"].state == state
+    assert bodies.free(q).all() == (state == "joined")
+    assert np.array_equal(bodies.free(q, 0.02), bodies.free(q)) == kept
+    assert np.isfinite(bodies.min_distance(q)[0][bodies.free(q)]).any() != kept
+    bar = {"name": "bar", "size_mm": [2000 * length, 30, 100], "xyz_mm": [0, 0, 0]}
+    scene = SceneFile.model_validate({"kind": "scene", "title": "made", "carried": {"boxes": [bar]}}).scene()
+    carrying = Bodies(robot.replace(hulls=boxes[:2]), scene)
+    assert 0 < carrying.free(q).mean() < 1  # what is carried is no housing
+
+
 def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes():
     """A base in the wrong unit, as a ball of 3 m: the rest of the arm is checked as before."""
     robot = load_robot("er3_600").replace(pair_rules=())

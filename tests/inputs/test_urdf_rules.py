@@ -42,8 +42,6 @@ BREAKS = {
     "urdf_no_mass": ('<mass value="2"/>', '<mass value="0"/>'),
     "urdf_no_collision": (re.compile("<collision>.*?</collision>"), ""),
     "urdf_mesh_missing": (re.compile('(?<=<collision><geometry>)<box size="[^"]*"/>'), '<mesh filename="none.stl"/>'),
-    "urdf_efforts_alike": (re.compile('effort="9."'), 'effort="50"'),
-    "urdf_masses_alike": (re.compile('mass value="."'), 'mass value="1"'),
 }  # fmt: skip
 WRONG = ("urdf_lengths", "urdf_angles", "urdf_limits_reversed", "urdf_inertia")
 

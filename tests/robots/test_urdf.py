@@ -265,6 +265,7 @@ def test_limits_that_a_continuous_joint_states_are_kept(tmp_path, limit, ends):
         ("name/meshes/x.stl", "name/meshes/x.stl", True),
         ("name/meshes/x.stl", "name/urdf/../meshes/x.stl", True),
         ("renamed/meshes/x.stl", "name/meshes/x.stl", True),  # by its package.xml
+        ("repository/renamed/meshes/x.stl", "name/meshes/x.stl", True),  # as in a workspace of several
         ("secret/x.stl", "name/../secret/x.stl", False),
         ("secret/x.stl", "../secret/x.stl", False),
         ("secret/x.stl", "name/{root}/secret/x.stl", False),
@@ -273,12 +274,12 @@ def test_limits_that_a_continuous_joint_states_are_kept(tmp_path, limit, ends):
 def test_a_package_holds_its_meshes_and_no_others(tmp_path, urdf_file, mesh, named, found):
     for folder in ("name" if mesh.startswith("secret") else ".", Path(urdf_file).parent, Path(mesh).parent):
         (tmp_path / folder).mkdir(parents=True, exist_ok=True)
-    if mesh.startswith("renamed"):
-        (tmp_path / "renamed/package.xml").write_text("<package><name>name</name></package>")
+    if "renamed" in mesh:
+        (tmp_path / mesh).parents[1].joinpath("package.xml").write_text("<package><name>name</name></package>")
     trimesh.creation.box((0.1, 0.1, 0.2)).export(tmp_path / mesh)
     text = urdf(extra=shaped(f'<mesh filename="package://{named.format(root=tmp_path)}"/>'))
     (tmp_path / urdf_file).write_text(text)
-    renamed = mesh.startswith("renamed") and urdf_file.startswith("name")  # the file is in a package of that name
+    renamed = "renamed" in mesh and urdf_file.startswith("name")  # the file is in a package of that name
     assert bool(import_urdf(tmp_path / urdf_file).robot.hulls) == (found and not renamed)
 
 
@@ -287,6 +288,14 @@ def test_an_axis_of_any_length_is_a_direction(tmp_path, random):
     q = random.uniform(-2, 2, (20, 6))
     expected = forward(import_urdf(written(tmp_path, urdf())).robot, q)
     np.testing.assert_allclose(forward(import_urdf(written(tmp_path, long)).robot, q), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("side", "shapes"), [(0.001, 0), (0.003, 1)])
+def test_a_cube_that_marks_a_frame_is_no_shape(tmp_path, side, shapes):
+    cube = shaped(f'<box size="{side} {side} {side}"/>')
+    assert len(import_urdf(written(tmp_path, urdf(extra=cube))).robot.hulls) == shapes
+    drawn = import_urdf(written(tmp_path, urdf(extra=cube.replace("collision", "visual")))).robot
+    assert len(drawn.meshes) == shapes  # a link without a shape is checked as it looks
 
 
 def test_a_flat_mesh_is_a_shape(tmp_path):
@@ -337,7 +346,8 @@ def test_a_mesh_has_the_unit_of_its_file_and_a_link_s_size(tmp_path, unit, side)
 
 
 def test_what_a_follower_states_of_itself_holds_the_joint_that_it_follows(tmp_path):
-    """Joint 2 turns three times as far as joint 1, and 0.5 rad more; limits 0 and 0 say nothing, 20 and 21 can't be."""
+    """Joint 2 turns three times as far as joint 1, and 0.5 rad more; limits 0 and 0 say
+    nothing, nor does one whole turn, 20 and 21 can't be."""
     follower = '<mimic joint="j1" multiplier="{}" offset="0.5"/>'
     cases = (
         ("3", (-6.5, 6.5, 9), (-2, 2, 3), False),
@@ -346,6 +356,8 @@ def test_what_a_follower_states_of_itself_holds_the_joint_that_it_follows(tmp_pa
         ("3", (20, 21, 9), (-2, 2, 3), True),
         ("3", (0, 0, 3), (-2, 2, 1), True),
         ("0.5", (-6.5, 6.5, 3), (-2, 2, 3), False),
+        ("0.5", (0, 6.2832, 3), (-2, 2, 3), False),
+        ("0.5", (0, 6.2, 3), (-1, 2, 3), True),
     )
     for factor, (least, most, own), (lower, upper, speed), told in cases:
         text = urdf()

@@ -15,8 +15,6 @@ RULES = {
     "urdf_no_limits": "{names}: no lower and upper limit",
     "urdf_no_velocity": "{names}: no velocity above 0, so its speed counts as unknown",
     "urdf_no_effort": "{names}: no effort above 0, so no torque is held against it",
-    "urdf_efforts_alike": "all joints have the effort {names}: a placeholder",
-    "urdf_masses_alike": "all links have the mass {names} kg: a placeholder",
     "urdf_no_mass": "{names}: drawn, and without a mass",
     "urdf_no_collision": "{names}: drawn, and without a shape for collisions",
     "urdf_mesh_missing": "{names}: this mesh was not found; keep its package in a folder above the file",
