@@ -43,7 +43,7 @@ def moment_kg_m(joint):
 
 @pytest.mark.parametrize("joint", [2, 3])
 def test_weight_times_lever_is_the_moment_that_the_joint_holds(joint):
-    lever, weight = drawn(joint)
+    lever, weight, *_ = drawn(joint)
     kg = sum(each.mass_kg for each in LINKS if each.link >= joint)
     far = np.linalg.norm(np.subtract(lever.end, lever.start))
     assert kg * far == pytest.approx(moment_kg_m(joint), rel=1e-6)
