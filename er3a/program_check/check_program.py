@@ -288,7 +288,7 @@ def _located(
     """All findings, like ones of an instruction grouped."""
     program, steps = execution.program, execution.steps
     top = Place(program.file)
-    found = [LocatedFinding(level_of(each), each, top) for each in program.findings]
+    found: list[LocatedFinding] = []
     named = {step.instruction.text for step in steps if isinstance(step.instruction, Unknown)}
     assigned = (each.target for each in chain(program.data, program.operations()) if isinstance(each, Assign))
     given = {target.name for target in assigned if isinstance(target, Variable)}
@@ -310,6 +310,7 @@ def _located(
     ]
     placed = [(each.place, fact("not_followed", text="", reason=each.kind)) for each in execution.cut]
     placed += [(place, fact("not_followed", text=text, reason="unreached")) for place, text in unreached.items()]
+    placed += [] if program.motions() else [(top, fact("program_nothing_moves"))]
     if obstacles is not None and obstacles.bodies.in_error:
         placed.append((top, fact("pairs_unexamined", pairs=obstacles.bodies.in_error)))
     found += [LocatedFinding(level_of(each), each, place) for place, each in placed]

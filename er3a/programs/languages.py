@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -16,7 +15,6 @@ import numpy as np
 
 from er3a.by_value import frozen
 from er3a.errors import InputError, ShapeError
-from er3a.finding import fact, is_one
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -133,12 +131,9 @@ def read_program(path: str | Path) -> Program:
             raise InputError(path, None, f"{held} of a program, not the program", remedy)
     source = read_program_text(path)
     try:
-        program = LANGUAGES[language_of(source)].reader(source)
+        return LANGUAGES[language_of(source)].reader(source)
     except RecursionError:
         raise InputError(path, None, "is nested too deeply", "Split its longest lines") from None
-    if not program.motions() and not any(is_one(each, "program_nothing_moves") for each in program.findings):
-        program = replace(program, findings=(*program.findings, fact("program_nothing_moves")))
-    return program
 
 
 def language_of(source: ProgramText) -> LanguageName:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from itertools import chain
 
 from er3a.by_value import slotted
 from er3a.programs import syntax
@@ -40,6 +41,7 @@ from er3a.programs.syntax import (
 IN_ONE_PLACE = 8  # ways, before what differs between them becomes unknown
 NEARLY_OVER = 0.1  # of the operations: from there on one way goes on in each place, so that all end
 STATE_COST = 10  # operations, as many as which the comparison of a state with others counts
+AGAIN_COST = 20  # operations, as many as which a motion counts that was carried out before
 OTHERWISE = "%otherwise"  # what makes motions go otherwise, and is not followed
 UNKNOWN_ROUNDS = 12  # of a loop that only something unknown ends, before what it changes becomes unknown
 
@@ -133,10 +135,14 @@ class Machine:
         self.steps: list[Step] = []
         self.endings: list[Ending] = []
         self.entered: set[str] = set()
+        self.met: set[Place] = set()  # of motions
         self.budget = limits.operations
         self.pending: dict[Where, list[Way]] = {}
         self.seen: dict[Hashable, int] = {}
         self.labels = {name: _labels(routine) for name, routine in program.routines.items()}
+        threads = chain.from_iterable(each.code for each in program.routines.values() if each.thread)
+        there = (each for each in threads if isinstance(each, Assign) and not each.local)
+        self.running = {*dialect.running, *(variable_of(each.target) for each in there)}
         self.fixed: set[str] = set()  # variables that nothing changes, or that nothing depends on
 
     def run(self) -> Execution:
@@ -208,7 +214,11 @@ class Machine:
         kept = self._one_of_each(ways, self._state) if len(ways) > 1 else ways
         if len(kept) > most:
             kept = self._one_of_each(kept, lambda way: way.memory.here.key())
-        return self._one_of_each(kept, lambda way: 0) if len(kept) > most else kept
+        return self._one(kept) if len(kept) > most else kept
+
+    def _one(self, ways: list[Way]) -> list[Way]:
+        """One way for all in a place."""
+        return self._one_of_each(ways, lambda way: 0)
 
     def _one_of_each(self, ways: list[Way], key: Callable[[Way], Hashable]) -> list[Way]:
         kept: dict[Hashable, Way] = {}
@@ -343,6 +353,8 @@ class Machine:
     def _move(self, way: Way, place: Place, motion: ArmMotion) -> None:
         """Carry a motion out: where it leaves the arm is what the program says, or what solving it says."""
         memory = way.memory
+        self.budget -= AGAIN_COST * (place in self.met)
+        self.met.add(place)
         if (otherwise := memory.shared.get(OTHERWISE)) is not None:
             motion = replace(motion, not_followed=motion.not_followed or syntax.shown(otherwise))
         moved = None if self.mover is None else self.mover(motion, memory.here.joints)
@@ -375,7 +387,7 @@ class Machine:
             return Output(name, syntax.shown(value))
         if key is None and memory.outside:  # where the controller stops: nothing is set
             return None
-        if root(name) in self.dialect.running:
+        if root(name) in self.running:
             memory.write(name, Unclear(name))
         else:
             declared = each.type_name == "global" or not self.dialect.local_by_default
@@ -399,10 +411,9 @@ class Machine:
         self._note(other, branch.place, Decision(branch.text, False))
         if branch.to <= at:
             self._round(other, at)
-        if self._waiting() + 1 >= self.limits.ways:
-            self.pending = {where: self._joined(here) for where, here in self.pending.items()}
-        if self._waiting() + 1 >= self.limits.ways:  # then one way in each place, for all that come to it
-            self.pending = {where: self._one_of_each(here, lambda way: 0) for where, here in self.pending.items()}
+        for join in (self._joined, self._one):  # then one way in each place, for all that come to it
+            if self._waiting() + 1 >= self.limits.ways:
+                self.pending = {where: join(here) for where, here in self.pending.items()}
         if self._waiting() + 1 < self.limits.ways:
             self._wait(other)
         else:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from er3a.by_value import ByValue, Displayed, slotted
-from er3a.finding import Finding
 from er3a.programs.instructions import Instruction, Place, Rate, RateUnit
 from er3a.programs.program_names import LanguageName
 
@@ -419,7 +418,6 @@ class Program(ByValue, Displayed):
     ----------
     entry : the routine with which it begins
     data : declarations (of a .dat or .var file, or of global variables), carried out first
-    findings : about the text
     constants : variables that nothing may change
     """
 
@@ -429,7 +427,6 @@ class Program(ByValue, Displayed):
     routines: Mapping[str, Routine]
     entry: str
     data: tuple[Assign, ...] = ()
-    findings: tuple[Finding, ...] = ()
     lines: tuple[str, ...] = field(default=(), repr=False)
     constants: frozenset[str] = frozenset()
 

@@ -99,7 +99,7 @@ MODULE MOD_Prog
     path = tmp_path / "Prog.mod"
     path.write_text(f"{head}{chr(10).join(lines)}\n    ENDPROC\n\nENDMODULE\n", encoding="utf-8")
     program = read_program(path)
-    assert program.findings == ()
+    assert program.motions()
     found = execute(program).listing().motions
     for T, motion in zip(wanted, found, strict=True):
         np.testing.assert_allclose(motion.target.pose[:3, 3], T[:3, 3], atol=1e-5)  # m

@@ -7,7 +7,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from er3a.errors import InputError
-from er3a.finding import fact
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import ArmMotion, Remark, Unknown, UnresolvedTarget
 from er3a.programs.languages import execute, read_program
@@ -104,7 +103,7 @@ def test_languages_are_told_by_what_the_file_holds(tmp_path):
 )
 def test_no_motion_at_all_is_a_finding(name, text, tmp_path):
     (tmp_path / name).write_text(text)
-    assert fact("program_nothing_moves") in read_program(tmp_path / name).findings
+    assert not read_program(tmp_path / name).motions()
 
 
 def test_deep_nesting_and_long_expressions_end(tmp_path):
@@ -188,7 +187,7 @@ def test_numbers_of_many_digits_and_long_words_are_read_at_once(tmp_path):
     text = "movep(p[" + "9" * 200 + ",0.18,0.3 - x*0.01,3.1416,0,0], a=1.2, v=0.1)\n"
     (tmp_path / "a.script").write_text(text)
     (tmp_path / "a.src").write_text("DEF a( )\nPTP {A1 1} " + "C_A" * 40 + "!\nEND\n")
-    assert read_program(tmp_path / "a.script").findings == ()
+    assert read_program(tmp_path / "a.script").motions()
     assert any(isinstance(each.instruction, Unknown) for each in execute(read_program(tmp_path / "a.src")).steps)
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
-from er3a.finding import fact
 from er3a.kinematics.forward import forward
 from er3a.programs.languages import execute, read_program, write_program
 from er3a.programs.solving import Resolver
@@ -23,7 +22,7 @@ FILES = [path for path in sorted(EXAMPLES.iterdir()) if path.suffix in SUFFIXES]
 def tool_points(path, robot):
     """Where the tool stands behind each motion of a program's main way, mm; all joints are found."""
     execution = execute(read_program(path), robot)
-    assert execution.program.findings == ()
+    assert execution.program.motions()
     assert execution.complete
     resolver, points = Resolver(robot, None), []
     for number, motion in enumerate(execution.listing().motions):
@@ -74,5 +73,5 @@ def test_examples_are_written_and_read_in_their_language(path, tmp_path):
 def test_faulty_programs_can_be_read(path):
     program = read_program(path)
     execution = execute(program, load_robot("er3a_c60"))
-    assert (fact("program_nothing_moves") in program.findings) == (path.stem == "no_motion")
+    assert (not program.motions()) == (path.stem == "no_motion")
     assert execution.complete

@@ -181,8 +181,38 @@ end
     np.testing.assert_allclose([each.target.pose[2, 3] for each in lines[:3]], [0.2020, 0.2520, 0.3020], atol=1e-5)
     assert lines[3].kind == "arc"
     assert lines[3].tool.pose[2, 3] == pytest.approx(0.1)
-    assert Unknown("run Counter()", may_move=False) in found
+    assert Aside("run Counter()") in found  # it moves nothing
+    assert {each.taken for each in found if isinstance(each, Decision) and "count" in each.condition} == {True, False}
     assert Unknown("speedl([0,0,0.1,0,0,0], 0.5, 1)", may_move=False) in found
+
+
+def test_what_threads_set_and_where_they_move_the_arm(tmp_path):
+    text = """def job():
+  global full = False
+  thread Watch():
+    while (True):
+      global full=get_standard_digital_in(1)
+      sync()
+    end
+  end
+  thread Away():
+    movel(p[0.1,0.2,0.3,0,0,0])
+  end
+  run Watch()
+  movej([0,0,0,0,0,0])
+  if (full):
+    movej([1,0,0,0,0,0])
+  end
+  away = run Away()
+  join away
+  movej(get_actual_joint_positions())
+end
+"""
+    found = said(run(tmp_path, "job.script", text))
+    turned = [each.target.joints[0] for each in found if isinstance(each, ArmMotion) and hasattr(each.target, "joints")]
+    assert turned == [0, 1]
+    assert {Aside("run Watch()"), Unknown("away = run Away()", may_move=False)} <= {*found}
+    assert isinstance(found[-1].target, UnresolvedTarget)
 
 
 def test_statements_outside_of_a_routine_are_the_program(tmp_path):
@@ -217,11 +247,10 @@ def test_where_the_tool_is_after_a_pose_is_that_pose(tmp_path, read):
     "text",
     [
         "x = [[0.0, 0.2], [0.1, 0.3]]\nmovej([x[1][0],0,0,0,0,0])\nmovej([x[0][1],0,0,0,0,0])",
-        "p = [0.1, 0.0]\nmovej([p[0],0,0,0,0,0])\np[1] = 0.2\nmovej([p[1],0,0,0,0,0])",
         "if True:\n movej([0.1,0,0,0,0,0]);\nend;\nmovej([0.2,0,0,0,0,0])",
     ],
 )
-def test_semicolons_matrices_and_a_variable_p(tmp_path, text):
+def test_semicolons_and_matrices(tmp_path, text):
     execution = run(tmp_path, "a.script", text + "\n")
     assert [each.target.joints[0] for each in execution.listing().motions] == [0.1, 0.2]
     assert not [step for step in execution.steps if isinstance(step.instruction, Unknown)]

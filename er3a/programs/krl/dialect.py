@@ -425,13 +425,11 @@ BAS: dict[str, Setting] = {
     "#ACC_CP": _line_acceleration,
     "#TOOL": _tool_number,
     "#BASE": _base_number,
-    "#EX_BASE": lambda memory, _: memory.write("$BASE", Unclear("BASE_DATA on an external axis")),
     "#FRAMES": _frames,
     "#PTP_DAT": lambda memory, _: _joint_data(memory, None),
     "#PTP_PARAMS": lambda memory, given: _with_frames(memory, _joint_data, given),
     "#CP_DAT": lambda memory, _: _line_data(memory, None),
     "#CP_PARAMS": lambda memory, given: _with_frames(memory, _line_data, given),
-    **dict.fromkeys(("#OUT_SYNC", "#OUT_ASYNC", "#GROUP", "#ACC_GLUE"), lambda memory, _: None),
 }
 """What commands of BAS do, by the value after them."""
 
@@ -798,8 +796,6 @@ def _zone(memory: ProgramMemory, kind: MotionKind, words: tuple[str, ...]) -> Zo
     given = [word for word in words if word.startswith("C_")]
     if not given:
         return FINE
-    if kind == "joint" and {"C_ORI", "C_VEL"}.intersection(given):  # which hold on the line or arc after it
-        return Zone("named", 0.0, " ".join(given))
     word = given[0]
     meant: tuple[str, ...] = (word,)
     if word == "C_SPL":

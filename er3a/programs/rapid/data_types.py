@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -63,6 +64,10 @@ ZONES: Mapping[str, float] = {
 """3 zonedata: mm of the path."""
 
 
+remembered = lru_cache(10_000)
+"""Keeps what a function makes of a value: a program meets the same targets and tools again and again."""
+
+
 def typed(value: Value, kind: str) -> Value:
     """A value as its declared type has it: aggregates get the names of their components.
 
@@ -103,6 +108,7 @@ def starting(kind: str) -> Value | None:
     return typed(tuple(starting(part) or 0 for part in SHAPES[kind].values()), kind)
 
 
+@remembered
 def predefined(name: str) -> Value | None:
     """The value of a name that every controller has.
 
@@ -134,7 +140,7 @@ def predefined(name: str) -> Value | None:
     }
     if name in values:
         return typed(*values[name])
-    return {"PI": math.pi, "HIGH": 1, "LOW": 0, "EDGE": 2, "WAIT_MAX": 0}.get(name)
+    return {"PI": math.pi, "HIGH": 1, "LOW": 0}.get(name)
 
 
 def part(value: Value | None, *path: str) -> Value | None:
@@ -195,6 +201,7 @@ def pose_matrix(value: Value | None) -> Reals | None:
     return pose_of((*xyz, *quaternion), "abb")
 
 
+@remembered
 def load_of(value: Value | None) -> MassBody | None:
     """Mass, centre and inertia of loaddata; None unless all its numbers are given.
 

@@ -35,7 +35,7 @@ from er3a.programs.instructions import (
     Zone,
 )
 from er3a.programs.rapid import data_types, known_names
-from er3a.programs.rapid.data_types import NO_AXIS, pose_matrix, pose_record
+from er3a.programs.rapid.data_types import NO_AXIS, pose_matrix, pose_record, remembered
 from er3a.programs.syntax import Record, Unclear, Value, Variable, numbers, rate_of, shown
 
 ROBOT_BASE = NamedFrame("wobj0", np.eye(4))
@@ -122,7 +122,8 @@ class RapidDialect(Dialect):
         tool, stationary = _tool(memory, move.arguments[tool_at], values[tool_at])
         base, held = _base(memory, dict(move.settings).get("WOBJ"), options.get("WOBJ"))
         checked = memory.read("%CONFJ" if kind == "joint" else "%CONFL") is not False
-        made = [_target(memory, value, (move.text, kind, absolute), checked) for value in values[:targets]]
+        said, joints = (move.text, kind, absolute), memory.cell.joints
+        made = [_target(value, joints, said, checked) for value in values[:targets]]
         if stationary or held:
             made = [UnresolvedTarget(move.text, "external_tool")] * targets
         taken = values[tool_at], options.get("WOBJ")
@@ -185,7 +186,8 @@ class RapidDialect(Dialect):
         return super().carry_out(memory, doing)
 
 
-def _target(memory: ProgramMemory, value: Value, said: tuple[str, MotionKind, bool], checked: bool) -> Target:
+@remembered
+def _target(value: Value, joints: int, said: tuple[str, MotionKind, bool], checked: bool) -> Target:
     """What a target means; ``said`` is the line, the motion's kind, and whether it wants joint angles."""
     text, kind, absolute = said
     if isinstance(value, Unclear):
@@ -199,17 +201,17 @@ def _target(memory: ProgramMemory, value: Value, said: tuple[str, MotionKind, bo
         return unresolved(unclear)
     external = data_types.external_axes(data_types.part(value, "EXTAX"))
     if absolute:
-        degrees, count = data_types.plain(parts[0], 6), memory.cell.joints
+        degrees = data_types.plain(parts[0], 6)
         if degrees is None:
             return UnresolvedTarget(text, "not_understood")
-        if any(each and abs(each) < NO_AXIS / 10 for each in degrees[count:]):
+        if any(each and abs(each) < NO_AXIS / 10 for each in degrees[joints:]):
             return UnresolvedTarget(text, "too_many_joints")
-        return JointTarget(np.radians(degrees[:count]), external)
+        return JointTarget(np.radians(degrees[:joints]), external)
     pose = pose_matrix(value)
     if pose is None:
         return UnresolvedTarget(text, "not_understood")
     conf = data_types.part(value, "ROBCONF")
-    branch = data_types.branch_of(conf, memory.cell.joints) if checked else None
+    branch = data_types.branch_of(conf, joints) if checked else None
     return PoseTarget(pose, _said(conf) if checked or kind != "joint" else (), external=external, branch=branch)
 
 
@@ -224,6 +226,7 @@ def _said(conf: Value | None) -> tuple[tuple[str, float | str], ...]:
     return tuple(zip(("cf1", "cf4", "cf6", "cfx"), known))
 
 
+@remembered
 def frame_of_tool(value: Value | None) -> tuple[Reals | None, bool]:
     """The pose of a tool, and whether it is stationary.
 
@@ -242,6 +245,7 @@ def frame_of_tool(value: Value | None) -> tuple[Reals | None, bool]:
     return pose, held is False
 
 
+@remembered
 def frame_of_object(value: Value | None) -> tuple[Reals | None, bool]:
     """T_robot_object (4, 4) in m of wobjdata, and whether the arm holds the object (3 wobjdata: robhold).
 
@@ -274,6 +278,7 @@ def _tool(memory: ProgramMemory, expression: object, value: Value) -> tuple[Name
     return NamedFrame(name, pose, load), stationary
 
 
+@remembered
 def _is_open(value: Value) -> bool:
     """Whether a part of a value is not known."""
     parts = value.values() if isinstance(value, Record) else value if isinstance(value, tuple) else ()

@@ -45,7 +45,6 @@ from er3a.programs.syntax import (
     rate_of,
     shown,
 )
-from er3a.programs.urscript.reader import LIST_METHODS
 from er3a.robots.masses import MassBody
 
 KINDS: dict[str, MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
@@ -58,7 +57,8 @@ PARAMETERS = {
 DEFAULTS = {"movej": (1.4, 1.05), "movel": (1.2, 0.25), "movep": (1.2, 0.25), "movec": (1.2, 0.25)}
 SAME_TURN = 1e-9  # of an element of a rotation matrix
 ROBOT_BASE = NamedFrame("base", np.eye(4))
-RESTING = frozenset(("set_gravity", "set_payload_mass", "set_payload_cog", "servoc", "servoj", "speedj", "speedl"))
+LIST_METHODS = frozenset(["append", "clear", "extend", "insert", "pop", "remove", "sort"])
+RESTING = frozenset(["run", "set_payload_mass", "set_payload_cog", "servoc", "servoj", "speedj", "speedl"])
 """What is not followed, and sets no tool; some of them move the arm."""
 HARMLESS_TEXT = """
 assert binary_list_to_integer conveyor_pulse_decode enable_external_ft_sensor encoder_enable_pulse_decode
@@ -86,7 +86,7 @@ request_integer_from_primary_client request_string_from_primary_client rpc_facto
 set_analog_inputrange set_analog_out set_analog_outputdomain set_baselight_off set_baselight_solid
 set_configurable_digital_input_action set_configurable_digital_out set_conveyor_tick_count set_digital_out
 set_euromap_output set_euromap_runstate_dependent_choice set_flag set_gp_boolean_input_action
-set_input_actions_to_default
+set_gravity set_input_actions_to_default set_runstate_outputs
 set_runstate_configurable_digital_output_to_value set_runstate_gp_boolean_output_to_value
 set_runstate_standard_analog_output_to_value set_runstate_standard_digital_output_to_value
 set_runstate_tool_digital_output_to_value set_safety_mode_transition_hardness set_standard_analog_input_domain
@@ -155,15 +155,6 @@ class UrScriptDialect(Dialect):
     frames = ("%tcp",)
     first_index = 0
     harmless = HARMLESS | SIGNATURES.keys() | {"struct"}
-
-    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
-        """Numbers of the language.
-
-        Returns
-        -------
-        value : pi for ``MATH_PI``; None for other names
-        """
-        return math.pi if name == "MATH_PI" else None
 
     def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
         """The value of ``[...]``, and of ``p[...]`` with six numbers.

@@ -11,11 +11,12 @@ from dataclasses import replace
 
 from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
-from er3a.programs.instructions import Place
+from er3a.programs.instructions import Place, Unknown
 from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, ranked
 from er3a.programs.syntax import (
     Assign,
     Call,
+    Doing,
     Element,
     Expression,
     Invocation,
@@ -26,16 +27,17 @@ from er3a.programs.syntax import (
     Variable,
     called_by_others,
 )
+from er3a.programs.urscript.dialect import HARMLESS, LIST_METHODS
 
 MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
 LONGEST_STATEMENT = 500  # lines
-LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
 
 
 TEXT = re.compile(r"""\"[^"\n]*"|'[^'\n]*'""")
 BREAKS = re.compile(rf"""(?P<comment>#[^\n]*)|(?P<text>{TEXT.pattern})|(?P<bad>["'])|(?P<mark>\n)""")
 OPEN_END = re.compile(r"(?:\b(?:or|and|xor|not)|[-+*/%^<>=,])$")
 """With what a line ends whose statement goes on in the next."""
+RUN = re.compile(r"(?:(?:global|local)\s+)?(?:\w+\s*=\s*)?run\s+(\w+)\s*\(")
 
 
 class UrWords(Words):
@@ -74,8 +76,7 @@ class UrWords(Words):
         if None in placed:
             raise MisreadError("an element is missing")
         given = tuple(each for each in placed if each is not None)
-        # ``p[...]``: a pose has six numbers; with one it is an element of a variable of this name.
-        return Element(Variable("p"), given) if kind and len(given) == 1 else Listed(kind, given)
+        return Listed(kind, given)
 
 
 def read_urscript(source: ProgramText) -> Program:
@@ -146,8 +147,8 @@ class _UrReader:
             self._close(builder, place)
         elif follows != "=" and block(builder, words, place, text.rstrip(":"), BLOCKS):
             pass
-        elif first == "run" and follows not in ("=", "("):
-            builder.unknown(place, text, may_move=False)
+        elif (thread := RUN.match(text)) is not None:
+            self._run(builder, place, text, thread[1])
         elif first in ("join", "kill", "enter_critical", "exit_critical", "pass") and follows not in ("=", "("):
             words.take()
             if first in ("join", "kill"):
@@ -165,6 +166,17 @@ class _UrReader:
         words.accept(":")
         words.finish()
         self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind in ("thread", "sec")))
+
+    def _run(self, builder: CodeBuilder, place: Place, text: str, name: str) -> None:
+        """The start of a thread: what it sets is unknown all along, and where the arm is too if the thread moves it."""
+        code = next((each.code for each in self.routines if each.name == name), None)
+        moves = code is None or any(
+            isinstance(each, Move)
+            or isinstance(getattr(each, "instruction", None), Unknown)
+            or (isinstance(each, Doing) and each.what.function not in HARMLESS)
+            for each in code
+        )
+        builder.add(Doing(place, Invocation("run" if moves else "sync", (), ()), text))
 
     def _close(self, builder: CodeBuilder, place: Place) -> None:
         if builder.blocks:
@@ -199,14 +211,9 @@ def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> Non
     scope = words.take() if words.next in ("global", "local") and words.kinds[words.at + 1] == "name" else ""
     left = words.expression()
     if words.accept("="):
-        if words.next == "run" and words.texts[words.at + 1] not in ("", "("):  # a thread
-            builder.unknown(place, text, may_move=False)
-            return
         value = words.expression()
         words.finish()
-        if isinstance(left, Listed) and left.kind == "p":  # a variable of this name, or a pose that is no target
-            left, value = Variable("p"), syntax.Opaque(text)
-        elif not isinstance(left, (Variable, syntax.Member, Element)):
+        if not isinstance(left, (Variable, syntax.Member, Element)):
             raise MisreadError("nothing can be assigned to this")
         builder.add(Assign(place, left, value, text, "global" if scope == "global" else "", scope == "local"))
         if isinstance(value, Invocation):
@@ -222,7 +229,7 @@ def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> Non
     elif left.function == "sleep" and len(left.arguments) == 1:
         builder.add(syntax.Waiting(place, "seconds", left.arguments[0], text))
     elif not _method(builder, left, place, text):
-        builder.add(syntax.Doing(place, left, text))
+        builder.add(Doing(place, left, text))
 
 
 def _method(builder: CodeBuilder, call: Invocation, place: Place, text: str) -> bool:
