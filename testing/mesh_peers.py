@@ -1,7 +1,7 @@
 """Arms with the meshes of their URDF, as Pinocchio places them and Coal measures them: the oracle for an arm's shapes.
 
-Nothing of ours is used for them but where a mesh's file is: Pinocchio reads the URDF and its meshes itself, and they
-are measured as triangles.
+Nothing of ours is used for them but where a mesh's file is: Pinocchio reads the URDF and its meshes itself (a DAE as
+trimesh reads it, as Coal's reader joins its parts wrongly), and they are measured as triangles.
 """
 
 from __future__ import annotations
@@ -13,13 +13,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import coal
 import numpy as np
 import pinocchio as pin
+import trimesh
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.distances import measure
+from er3a.collision.distances import some_distances
 from er3a.collision.pairs import link_label
 from er3a.collision.shapes import arm_bodies, layout_of
 from er3a.formats.urdf import UrdfImport
@@ -38,10 +40,10 @@ class MeshPeer:
     """
 
     def __init__(self, path: Path, imported: UrdfImport) -> None:
-        text = _with_files(path)
-        self.model = pin.buildModelFromXML(text)
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), TemporaryDirectory() as folder:
             warnings.simplefilter("ignore")  # of Pinocchio's conversions
+            text = _with_files(path, Path(folder))
+            self.model = pin.buildModelFromXML(text)
             self.geometry = pin.buildGeomFromUrdfString(self.model, text, pin.GeometryType.COLLISION)
         self.data, self.placed = self.model.createData(), pin.GeometryData(self.geometry)
         self.joints = [self.model.joints[self.model.getJointId(name)] for name in imported.joints]
@@ -73,8 +75,8 @@ class MeshPeer:
         return least
 
 
-def _with_files(path: Path) -> str:
-    """A URDF's text with the files of its meshes where they are; without those that are nowhere."""
+def _with_files(path: Path, folder: Path) -> str:
+    """A URDF's text with the files of its meshes where they are, a DAE's as STL; without those that are nowhere."""
     root = ElementTree.parse(path).getroot()
     for link in root.iter("link"):
         for collision in link.findall("collision"):
@@ -82,6 +84,9 @@ def _with_files(path: Path) -> str:
             if mesh is None:
                 continue
             if file := mesh_of(path, mesh.get("filename", "")):
+                if file.suffix.lower() == ".dae":
+                    read = trimesh.load_mesh(file).convert_units("meters")
+                    read.export(file := folder / f"{id(mesh)}.stl")
                 mesh.set("filename", str(file))
             else:
                 link.remove(collision)
@@ -158,8 +163,8 @@ def _shape_distances(robot: Robot, q: np.ndarray) -> dict[tuple[int, int], tuple
     """Of each two links the least distance (N,) of their shapes, at most 0 where they overlap, and their pairs."""
     own = arm_bodies(robot)
     pairs = [(a, b) for a, b in product(range(len(own)), repeat=2) if own[a].link < own[b].link]
-    layout, found, none = layout_of(robot, own, pairs), np.empty((len(q), len(pairs))), np.empty(len(q))
-    measure(layout, q, found, none, np.empty(len(q), np.int64), np.empty(len(q), bool))
+    layout, every = layout_of(robot, own, pairs), np.arange(len(pairs))
+    found = np.array([some_distances(layout, joints, every)[0] for joints in q])
     columns: dict[tuple[int, int], list[int]] = {}
     for column, (a, b) in enumerate(pairs):
         columns.setdefault((own[a].link, own[b].link), []).append(column)

@@ -167,7 +167,7 @@ class Bodies:
         """
         q = np.ascontiguousarray(q, float)
         smallest, pair, deep = np.empty(len(q)), np.empty(len(q), np.int64), np.zeros(len(q), bool)
-        measure(self.layout, q, np.empty((0, 0)), smallest, pair, deep)
+        measure(self.layout, q, smallest, pair, deep)
         rows = np.flatnonzero(deep)
         for row, overlap in zip(rows, self.overlaps(q[rows])):
             pairs = np.flatnonzero(overlap)

@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 
 from er3a.numerics.arrays import Reals, copy_values
-from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.jit import borrowing_kernel, kernel
 
 EXACT = 1e-11  # m, at which the iteration stops
 TOUCHING = 1e-9  # m; cores that are nearer overlap
@@ -31,7 +31,7 @@ ROUNDS = 64
 AXIS, _WEIGHT, _NEAR, ROOM = 12, 13, 17, 19
 
 
-@inner_kernel
+@borrowing_kernel
 def _point_on_line(w: Reals, p: int, a: int, b: int) -> float:
     """Parameter in [0, 1] of the point of the line from row a to row b that is nearest to row p."""
     length = along = 0.0
@@ -41,7 +41,7 @@ def _point_on_line(w: Reals, p: int, a: int, b: int) -> float:
     return min(1.0, max(0.0, along / length)) if length > 0 else 0.0
 
 
-@inner_kernel
+@borrowing_kernel
 def _between(w: Reals, a0: int, a1: int, b0: int, b1: int, s: float, t: float) -> float:
     """Square of the distance of two points on lines."""
     square = 0.0
@@ -50,7 +50,7 @@ def _between(w: Reals, a0: int, a1: int, b0: int, b1: int, s: float, t: float) -
     return square
 
 
-@inner_kernel
+@borrowing_kernel
 def lines_distance(w: Reals, a0: int, a1: int, b0: int, b1: int, near: Reals) -> float:
     """Distance of two line segments, in closed form [1]_ (section 5.1.9).
 
@@ -91,7 +91,7 @@ def lines_distance(w: Reals, a0: int, a1: int, b0: int, b1: int, near: Reals) ->
     return float(np.sqrt(best))
 
 
-@inner_kernel
+@borrowing_kernel
 def support(w: Reals, first: int, last: int, disc: float, room: Reals, sign: float, row: int) -> None:
     """The point of a core that is farthest along a direction, written into a row of scratch memory.
 
@@ -123,7 +123,7 @@ def support(w: Reals, first: int, last: int, disc: float, room: Reals, sign: flo
             room[row, 2] += scale * k
 
 
-@inner_kernel
+@borrowing_kernel
 def _triangle(room: Reals, i: int, j: int, k: int) -> tuple[float, float, float]:
     """Weights of the point of a triangle that is nearest to the origin (Ericson, 5.1.5)."""
     d1 = d2 = d3 = d4 = d5 = d6 = 0.0
@@ -155,7 +155,7 @@ def _triangle(room: Reals, i: int, j: int, k: int) -> tuple[float, float, float]
     return va / total, vb / total, vc / total
 
 
-@inner_kernel
+@borrowing_kernel
 def _faces_origin(room: Reals, i: int, j: int, k: int, out: int) -> bool:
     """Whether a face of a tetrahedron has the origin on its outer side, or the tetrahedron is flat."""
     ux, uy, uz = room[j, 0] - room[i, 0], room[j, 1] - room[i, 1], room[j, 2] - room[i, 2]
@@ -166,7 +166,7 @@ def _faces_origin(room: Reals, i: int, j: int, k: int, out: int) -> bool:
     return bool(here * there <= 0 or abs(there) <= 1e-18)
 
 
-@inner_kernel
+@borrowing_kernel
 def _nearest_of_simplex(room: Reals, count: int) -> bool:
     """Weights (first column of the rows from _WEIGHT on) of the simplex's point that is nearest to the origin.
 
@@ -205,7 +205,7 @@ def _nearest_of_simplex(room: Reals, count: int) -> bool:
     return inside
 
 
-@inner_kernel
+@borrowing_kernel
 def cores_distance(  # noqa: C901, PLR0912
     w: Reals, bounds: tuple[int, int, int, int], disc_a: float, disc_b: float, room: Reals, near: Reals, far: float
 ) -> float:
@@ -276,7 +276,7 @@ def cores_distance(  # noqa: C901, PLR0912
     return float(size)
 
 
-@inner_kernel
+@borrowing_kernel
 def above_plane(w: Reals, first: int, last: int, disc: float, plane: int, room: Reals, near: Reals) -> float:
     """How far a core stays above a half-space.
 

@@ -27,10 +27,10 @@ from er3a.collision.convex import (
     lines_distance,
     support,
 )
-from er3a.collision.triangles import Trees, surface_above_plane, surface_distance
+from er3a.collision.triangles import Trees, hulls_distance, surface_above_plane, surface_distance
 from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
-from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
+from er3a.numerics.jit import borrowing_kernel, inner_kernel, kernel
 
 HULL, CYLINDER, HALF_SPACE = 0, 1, 2
 
@@ -82,7 +82,7 @@ class Layout(NamedTuple):
     inner: Integers
 
 
-@inner_kernel
+@borrowing_kernel
 def pair_distance(
     layout: Layout, T: Reals, w: Reals, a: int, b: int, room: Reals, near: Reals, far: float
 ) -> tuple[float, bool]:
@@ -107,26 +107,59 @@ def pair_distance(
         if convex:
             return above_plane(w, i, i_end, disc[a], j, room, near) - sizes, False
         normal = (w[j, 0], w[j, 1], w[j, 2])
-        return surface_above_plane(trees, T[link[a]], trees.root[a], normal, w[j + 1, 0], near), False
+        return surface_above_plane(trees, T[link[a]], a, normal, w[j + 1, 0], near), False
     if i_end - i <= 2 and j_end - j <= 2 and kind[a] == HULL and kind[b] == HULL:
         return lines_distance(w, i, i_end - 1, j, j_end - 1, near) - sizes, False
-    core = cores_distance(w, (i, i_end, j, j_end), disc[a], disc[b], room, near, np.inf)
-    if convex or core - sizes > max(far, 0.0):
+    least = np.inf if convex else max(far, 0.0) + sizes
+    core = cores_distance(w, (i, i_end, j, j_end), disc[a], disc[b], room, near, least)
+    if convex or core > least:
         return core - sizes, core == 0.0
+    if trees.root[a] >= 0 and trees.root[b] >= 0:
+        return surfaces_distance(trees, a, T[link[a]], b, T[link[b]], room, near, least)
     if trees.root[a] < 0:
         other = (w, i, i_end, disc[a])
         for turn in range(2):
             for r in range(3):
                 near[0, r], near[1, r] = near[1, r], near[0, r]
             if turn == 0:
-                core = surface_distance(trees, b, T[link[b]], a, T[link[a]], other, room, near, far + sizes)
+                core = surface_distance(trees, b, T[link[b]], a, T[link[a]], other, room, near, (core, far + sizes))
     else:
         other = (w, j, j_end, disc[b])
-        core = surface_distance(trees, a, T[link[a]], b, T[link[b]], other, room, near, far + sizes)
+        core = surface_distance(trees, a, T[link[a]], b, T[link[b]], other, room, near, (core, far + sizes))
     return core - sizes, core == 0.0
 
 
 @inner_kernel
+def surfaces_distance(
+    trees: Trees, a: int, T: Reals, b: int, S: Reals, room: Reals, near: Reals, far: float
+) -> tuple[float, bool]:
+    """Distance of two surfaces, and whether they cross: that of their hulls, where these are nearest on the surfaces.
+
+    Parameters
+    ----------
+    a, b, T, S : numbers of the bodies, and what places them
+    room, near, far : as for :func:`pair_distance`; ``near`` holds a guess
+
+    Returns
+    -------
+    distance, overlap : m
+    """
+    least, close, ends = hulls_distance(trees, a, T, b, S, room, near, far), np.empty((2, 3)), near.copy()
+    if least > far:
+        return least, False
+    if least > 0:  # the surfaces' own points nearest to the hulls' nearest ones
+        for k, body, frame in ((0, a, T), (1, b, S)):
+            surface_distance(trees, body, frame, -1, frame, (ends, k, k + 1, 0.0), room, close, (1e-99, np.inf))
+            copy_values(close[0], near[k])
+        size = 0.0
+        for r in range(3):
+            size += (near[1, r] - near[0, r]) ** 2
+        far = min(far, np.sqrt(size))
+    core = surface_distance(trees, a, T, b, S, (room, 0, 0, 0.0), room, near, (least, far))
+    return core, core == 0.0
+
+
+@borrowing_kernel
 def _apart_along(layout: Layout, w: Reals, a: int, b: int, room: Reals, axis: Reals) -> bool:
     """Whether a direction (3,) shows that a body lies wholly beyond another, neither of them a half-space."""
     start, radius, disc = layout.start, layout.radius, layout.disc
@@ -140,7 +173,7 @@ def _apart_along(layout: Layout, w: Reals, a: int, b: int, room: Reals, axis: Re
     return bool(gap > EXACT)
 
 
-@inner_kernel
+@borrowing_kernel
 def _row_value(coupling: Reals, q: Reals, k: int) -> float:
     """What row k moves by, for joints (n,)."""
     if coupling.shape[0] == 0:
@@ -151,7 +184,7 @@ def _row_value(coupling: Reals, q: Reals, k: int) -> float:
     return value
 
 
-@inner_kernel
+@borrowing_kernel
 def _row_reach(coupling: Reals, half: Reals, k: int) -> float:
     """What row k moves by at most while each joint moves by up to ``half`` (n,)."""
     if coupling.shape[0] == 0:
@@ -178,7 +211,7 @@ def unplaced(layout: Layout) -> tuple[Reals, Reals, Reals]:
     return np.empty((rows, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape)
 
 
-@inner_kernel
+@borrowing_kernel
 def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> None:
     """Place base, links and bodies at joint values.
 
@@ -195,7 +228,7 @@ def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> No
         _place_points(layout, T, b, world)
 
 
-@inner_kernel
+@borrowing_kernel
 def _place_frames(layout: Layout, q: Reals, T: Reals) -> None:
     direction, starts, sliding, links = layout.direction, layout.starts, layout.sliding, layout.links
     x, y, z = rows_of(layout.base)
@@ -213,14 +246,14 @@ def _place_frames(layout: Layout, q: Reals, T: Reals) -> None:
     write_rows((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), T[direction.shape[0] + 1])
 
 
-@inner_kernel
+@borrowing_kernel
 def _place_middle(layout: Layout, T: Reals, b: int, middle: Reals) -> None:
     centre, f = layout.centre, layout.link[b]
     for r in range(3):
         middle[b, r] = T[f, r, 0] * centre[b, 0] + T[f, r, 1] * centre[b, 1] + T[f, r, 2] * centre[b, 2] + T[f, r, 3]
 
 
-@inner_kernel
+@borrowing_kernel
 def _place_points(layout: Layout, T: Reals, b: int, world: Reals) -> None:
     points, f = layout.points, layout.link[b]
     for r in range(3):
@@ -229,7 +262,7 @@ def _place_points(layout: Layout, T: Reals, b: int, world: Reals) -> None:
             world[p, r] = u * points[p, 0] + v * points[p, 1] + w * points[p, 2] + t
 
 
-@inner_kernel
+@borrowing_kernel
 def _apart(middle: Reals, reach: Reals, a: int, b: int) -> float:
     """A lower bound of the distance of two bodies, by the balls around them; a half-space has no ball."""
     square = 0.0
@@ -263,53 +296,46 @@ def some_distances(layout: Layout, q: Reals, pairs: Integers) -> tuple[Reals, Fl
 
 
 @kernel
-def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integers, deep: Flags) -> None:
-    """Distances of all pairs in many arm poses, or the smallest of each; of overlapping cores the smallest known depth.
+def measure(layout: Layout, q: Reals, smallest: Reals, pair: Integers, deep: Flags) -> None:
+    """The smallest distance in many arm poses; of overlapping cores the smallest known depth.
 
-    Without columns of ``found`` pairs that can't be the nearest are left out: hulls first, then surfaces, the nearest
-    hulls around them first.
+    At first only whether surfaces overlap. Then pairs that can't be the nearest are left out. What was nearest in the
+    pose before is measured first, as it mostly is again.
 
     Parameters
     ----------
     q : (N, n), rad or m
-    found : (N, K), gets all distances, m; or (0, 0)
     smallest, pair : (N,), get the smallest distance, m, and its number; joined pairs count only where they overlap
     deep : (N,), gets whether cores overlapped, or a surface and another body, whose depth is not known then
     """
     room, near = np.empty((ROOM, 3)), np.zeros((2, 3))
     T, w, middle = unplaced(layout)
-    reach, first, second, joined = layout.reach, layout.first, layout.second, layout.joined
-    every, root, least = found.shape[1] > 0, layout.trees.root, np.empty(len(first))
+    reach, first, second, root, count, at = (
+        layout.reach,
+        layout.first,
+        layout.second,
+        layout.trees.root,
+        len(layout.first),
+        -1,
+    )
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
-        best, at, inside = np.inf, -1, False
-        for k in range(len(first)):
+        start, best, at, inside = max(at, 0), np.inf, -1, False
+        for turn in range(-count, count):
+            k = (start + turn) % count
             a, b = first[k], second[k]
-            least[k] = np.inf
-            if not every and _apart(middle, reach, a, b) >= best:
+            surface, far = root[a] >= 0 or root[b] >= 0, 0.0 if turn < 0 else best
+            if inside or (turn < 0 and not surface) or _apart(middle, reach, a, b) >= far:
                 continue
-            distance, overlap = pair_distance(layout, T, w, a, b, room, near, np.inf if every else 0.0)
-            surface = root[a] >= 0 or root[b] >= 0
-            inside = inside or overlap or (surface and distance < 0)
-            if every:
-                found[n, k] = distance
-            elif surface and not inside:
-                least[k] = np.inf if joined[k] else distance
-            if least[k] == np.inf and distance < best and not (joined[k] and distance >= 0 and not overlap):
-                best, at = distance, k
-        while not inside and len(least):
-            k = int(least.argmin())
-            if least[k] >= best:
-                break
-            distance = pair_distance(layout, T, w, first[k], second[k], room, near, best)[0]
-            least[k] = np.inf
-            if distance < best:
+            distance, overlap = pair_distance(layout, T, w, a, b, room, near, 0.0 if layout.joined[k] else far)
+            inside = overlap or (surface and distance < 0)
+            if distance < best and (inside or turn >= 0) and not (layout.joined[k] and distance >= 0 and not overlap):
                 best, at = distance, k
         smallest[n], pair[n], deep[n] = best, at, inside
 
 
 @kernel
-def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:  # noqa: C901, PLR0912
+def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
     """Which pairs overlap, in many arm poses.
 
     What the pose before has shown is tried first, for it mostly holds again: the pair that overlapped, the direction
@@ -320,11 +346,25 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:  # noqa: C901
     q : (N, n), rad or m
     found : (N, K) bool, gets which overlap; with one column, whether any does
     """
-    room, near = np.empty((ROOM, 3)), np.zeros((2, 3))
-    T, w, middle = unplaced(layout)
+    axes, placed = np.zeros((len(layout.first), 3)), np.full(len(layout.link), -1)
+    _which_overlap(layout, q, found, unplaced(layout), np.empty((ROOM, 3)), np.zeros((2, 3)), axes, placed)
+
+
+@borrowing_kernel
+def _which_overlap(  # noqa: C901, PLR0912
+    layout: Layout,
+    q: Reals,
+    found: Flags,
+    places: tuple[Reals, Reals, Reals],
+    room: Reals,
+    near: Reals,
+    axes: Reals,
+    placed: Integers,
+) -> None:
+    """As :func:`which_overlap`; ``placed`` is the arm for which a body's points are."""
+    T, w, middle = places
     reach, first, second, link = layout.reach, layout.first, layout.second, layout.link
-    one, axes, hit, count = found.shape[1] == 1, np.zeros((len(first), 3)), 0, len(first)
-    placed = np.full(len(link), -1)  # the arm for which a body's points are
+    one, hit, count = found.shape[1] == 1, 0, len(first)
     if q.shape[0]:
         place(layout, q[0], T, w, middle)
     for n in range(q.shape[0]):
@@ -361,13 +401,13 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:  # noqa: C901
                     axes[k, r] /= np.sqrt(width)
 
 
-@inner_kernel
+@borrowing_kernel
 def _balls_apart(middle: Reals, reach: Reals, a: int, b: int) -> bool:
     x, y, z = middle[a, 0] - middle[b, 0], middle[a, 1] - middle[b, 1], middle[a, 2] - middle[b, 2]
     return bool(x * x + y * y + z * z >= (reach[a] + reach[b]) ** 2)
 
 
-@inner_kernel
+@borrowing_kernel
 def _ball_above(layout: Layout, middle: Reals, a: int, plane: int) -> float:
     """How far the ball around a body stays above a half-space."""
     height, p = -layout.points[layout.start[plane] + 1, 0] - layout.reach[a], layout.start[plane]
@@ -376,7 +416,7 @@ def _ball_above(layout: Layout, middle: Reals, a: int, plane: int) -> float:
     return float(height)
 
 
-@inner_kernel
+@borrowing_kernel
 def _body_motion(layout: Layout, T: Reals, w: Reals, b: int, inner: int, half: Reals) -> float:
     """How far a body moves at most, seen from what carries row ``inner``, while joints move by up to ``half`` (n,)."""
     moved, first, last = 0.0, layout.start[b], layout.start[b + 1]
@@ -394,14 +434,14 @@ def _body_motion(layout: Layout, T: Reals, w: Reals, b: int, inner: int, half: R
     return moved
 
 
-@inner_kernel
+@borrowing_kernel
 def _pair_motion(layout: Layout, T: Reals, w: Reals, k: int, half: Reals) -> float:
     """How far the bodies of a pair move against each other at most; what moves is no cylinder."""
     b = layout.first[k] if layout.link[layout.second[k]] == WORLD else layout.second[k]
     return _body_motion(layout, T, w, b, layout.inner[k], half)
 
 
-@inner_kernel
+@borrowing_kernel
 def _box_state(
     layout: Layout, q: Reals, half: Reals, placed: tuple[Reals, Reals, Reals], room: Reals, near: Reals
 ) -> tuple[int, float]:
@@ -466,7 +506,7 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
     return result, looked
 
 
-@inner_kernel
+@borrowing_kernel
 def _set_box(box: Reals, low: Reals, high: Reals) -> None:
     """Written out: numba's assignment of a slice brings its error message with it, a second of compiling."""
     for j in range(low.shape[0]):

@@ -307,7 +307,7 @@ def _drawn(robot: Robot) -> Reals:
 def _least(robot: Robot, pairs: Sequence[BodyPair], count: int = TRIED) -> Reals:
     """The smallest distance of pairs (count,), m, in the first of the joint vectors drawn."""
     q, found = _drawn(robot)[:count], np.empty(count)
-    measure(_layout(robot, pairs), q, np.empty((0, 0)), found, np.empty(count, np.int64), np.empty(count, bool))
+    measure(_layout(robot, pairs), q, found, np.empty(count, np.int64), np.empty(count, bool))
     return found
 
 

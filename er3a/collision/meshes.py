@@ -42,22 +42,22 @@ def simplified(vertices: Reals, faces: Integers, most: int) -> tuple[Reals, Inte
 
 
 def is_convex(vertices: Reals, faces: Integers) -> bool:
-    """Whether a closed mesh fills its hull, by volumes from signed tetrahedra.
+    """Whether a closed mesh fills its hull, by the volumes of tetrahedra from a point inside to its triangles.
 
     Parameters
     ----------
     vertices : (k, 3), m
-    faces : (F, 3), rows of ``vertices``, their normals outwards
+    faces : (F, 3), rows of ``vertices``
 
     Returns
     -------
     convex : False for a flat mesh
     """
     try:
-        hull, corners = scipy.spatial.ConvexHull(vertices), vertices[faces] - vertices[0]
+        hull, corners = scipy.spatial.ConvexHull(vertices), vertices[faces] - vertices.mean(axis=0)
     except scipy.spatial.QhullError:  # flat
         return False
-    volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6
+    volume = float(np.abs(np.linalg.det(corners)).sum()) / 6
     return bool(abs(hull.volume - volume) <= CONVEX * hull.volume)
 
 

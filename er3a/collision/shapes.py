@@ -29,7 +29,7 @@ import scipy
 from er3a.by_value import by_identity, frozen
 from er3a.collision.convex import cylinder_points, distances_from_hull
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout
-from er3a.collision.meshes import MOST_CORNERS, hull_corners, is_convex
+from er3a.collision.meshes import MOST_CORNERS, is_convex
 from er3a.collision.pairs import BASE, Pair, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
 from er3a.collision.triangles import TriangleTree, depths_inside, outer_corners, tree_of, trees_of
@@ -367,13 +367,8 @@ class Body:
 @lru_cache(maxsize=64)
 def _surface(mesh: LinkMesh) -> Body:
     """A link's surface as a body."""
-    return Body(
-        link_label(mesh.link),
-        mesh.link,
-        outer_corners(mesh.points[np.unique(mesh.faces)]),
-        0.0,
-        tree=tree_of(mesh.points, mesh.faces),
-    )
+    tree = tree_of(mesh.points, mesh.faces)
+    return Body(link_label(mesh.link), mesh.link, outer_corners(tree.hull), 0.0, tree=tree)
 
 
 def arm_bodies(robot: Robot) -> tuple[Body, ...]:
@@ -453,10 +448,9 @@ def solid_body(solid: Solid) -> Body:
 def _mesh_body(solid: Mesh) -> Body:
     """A mesh with its tree: it takes a while to grow, so those used last are kept."""
     points, tree = placed_points(solid), tree_of(placed_points(solid), solid.faces)
-    corners = hull_corners(points[np.unique(solid.faces)])
-    if tree.shell.all() and len(corners) <= MOST_CORNERS and is_convex(points, solid.faces):
-        return Body(solid.name, WORLD, corners, 0.0)
-    return Body(solid.name, WORLD, outer_corners(corners), 0.0, tree=tree)
+    if tree.shell.all() and len(tree.hull) <= MOST_CORNERS and is_convex(points, solid.faces):
+        return Body(solid.name, WORLD, tree.hull, 0.0)
+    return Body(solid.name, WORLD, outer_corners(tree.hull), 0.0, tree=tree)
 
 
 def depths_in(solid: Solid, points: Reals) -> Reals:
@@ -497,7 +491,7 @@ def depth_inside(body: Body, other: Body, T: Reals) -> float:
 def _depths_in(body: Body, points: Reals) -> Reals:
     if body.tree is not None:
         found = np.zeros(len(points))
-        depths_inside(trees_of([body.tree, None]), np.ascontiguousarray(points), found)
+        depths_inside(trees_of([body.tree]), np.ascontiguousarray(points), found)
         return found
     if body.kind == HALF_SPACE:
         return np.asarray(body.points[1, 0] - points @ body.points[0])

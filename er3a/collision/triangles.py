@@ -4,9 +4,12 @@ A tree cuts the box of the triangles' middles in half along its longest side, at
 until each box holds one triangle. A box lies along the principal axes of what it holds, and so is as thin as that:
 housings that turn in each other are near over a wide area. Two surfaces are measured by descending both trees at once,
 the nearer boxes first, or those that are deeper in each other; boxes that are farther away than what was found are left
-out. The distance of two boxes is bounded from below by the box of one that holds the other, in either's axes; boxes
-that overlap so are tried along the directions across two of their edges [1]_. Two triangles are measured as convex
-cores, and so is a triangle with a convex body.
+out. The distance of two boxes is bounded from below by the box of one that holds the other, in either's axes [1]_. Two
+triangles are measured as convex cores, and so is a triangle with a convex body.
+
+The hulls of two surfaces are measured before, as facing rings are nearest all around and leave boxes little to rule
+out. Where the hulls are nearest, on either, lies mostly a point of the surface: then theirs is the distance. The corner
+of a hull that is farthest along a direction is found uphill, from corner to corner along its edges [2]_.
 
 A surface may consist of many shells. A point is inside if a ray from it crosses one of the closed shells an odd number
 of times. What does not cross a surface, but has a point of one of its shells inside, is inside as a whole. Of a shell
@@ -17,26 +20,32 @@ References
 ----------
 .. [1] S. Gottschalk, M. C. Lin, D. Manocha, "OBBTree: a hierarchical structure for rapid interference detection",
    SIGGRAPH (1996).
+.. [2] S. Cameron, "Enhancing GJK: computing minimum and penetration distances between convex polyhedra", IEEE Int.
+   Conf. Robotics and Automation (1997).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import reduce
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 import scipy
+from scipy.spatial import ConvexHull, QhullError
 
 from er3a.by_value import ByValue, frozen
-from er3a.collision.convex import ROOM, TOUCHING, cores_distance
+from er3a.collision.convex import EXACT, ROOM, TOUCHING, cores_distance
 from er3a.geometry.vectors import Vector, fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
-from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
+from er3a.numerics.jit import borrowing_kernel, inlined_kernel, inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 96 levels deep at most
+GROWN = 24  # corners of each hull at most, among which the nearest points of two are looked for
 FIRST = 14  # corners, with which the choice of few of a hull begins
-EDGE = 1e-9  # m; gaps along directions across two edges count from here on, as parallel edges give none
+ROUNDING = 1e-12  # m
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
 
@@ -53,6 +62,8 @@ class TriangleTree(ByValue):
     corner : (F, 3, 3), m
     shell : (F,), a number of the closed shell that a triangle belongs to, 0 for one that is not closed
     probe : (S, 3), m, a point of each shell that is not inside another one
+    hull : (H, 3), m, the corners of its hull
+    fan : (H, 2), of each corner where its neighbours on the hull begin and end in ``edge`` (E,)
     """
 
     box: Reals
@@ -61,12 +72,16 @@ class TriangleTree(ByValue):
     corner: Reals
     shell: Integers
     probe: Reals
+    hull: Reals
+    fan: Integers
+    edge: Integers
 
 
 class Trees(NamedTuple):
     """The trees of the surfaces among B bodies, as kernels take them: as :class:`TriangleTree`, one after the other.
 
-    ``root`` (B,): the first box of each body's tree, -1 for convex bodies; ``first``, ``last`` (B,): its probes.
+    ``root`` (B,): the first box of each body's tree, -1 for convex bodies; ``first``, ``last`` (B,): its probes;
+    ``start`` (B,): the first corner of its hull.
     """
 
     root: Integers
@@ -76,8 +91,12 @@ class Trees(NamedTuple):
     corner: Reals
     shell: Integers
     probe: Reals
+    hull: Reals
+    fan: Integers
+    edge: Integers
     first: Integers
     last: Integers
+    start: Integers
 
 
 def tree_of(points: Reals, faces: Integers) -> TriangleTree:
@@ -132,16 +151,31 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
         cut = begin + np.clip(np.add.reduceat(along < 0, begin), least, sizes - least)
         starts = np.stack([begin, cut], axis=1).ravel()
         ends = np.stack([cut, begin + sizes], axis=1).ravel()
-    probe, around = points[faces.ravel()[last]], np.empty(len(last), np.int64)
+    probe, around = points[faces.ravel()[last]], np.zeros(len(last), np.int64)
     trees = np.concatenate(boxes), np.concatenate(slims), np.concatenate(children)
-    tree = TriangleTree(*trees, corner, shell, probe)
-    shells_around(trees_of([tree]), probe, around)
+    tree = TriangleTree(*trees, corner, shell, probe, *_hull(points[np.unique(faces)]))
+    if shell.any():
+        shells_around(trees_of([tree]), probe, around)
     return replace(tree, probe=probe[(around == 0) | (around == shell[last // 3])])
+
+
+def _hull(points: Reals) -> tuple[Reals, Integers, Integers]:
+    """The corners of a hull, and how edges join them, as a tree has them; points in a plane are joggled for it."""
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        points = np.concatenate([points, points])  # four at least
+        hull = ConvexHull(points, qhull_options="QJ")
+    kept, order = np.unique(hull.simplices, return_inverse=True)
+    simplices = order.reshape(-1, 3)
+    pairs = np.unique(simplices[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2), axis=0)
+    ends = np.cumsum(np.bincount(pairs[:, 0]))
+    return points[kept], np.stack([np.append(0, ends[:-1]), ends], axis=1), pairs[:, 1]
 
 
 def _bounds(corner: Reals, starts: Integers) -> Reals:
     """Middle and half the edges (n, 2, 3) of boxes around triangles (F, 3, 3), each from one of ``starts`` on."""
-    lower, upper = (bound.reduceat(bound.reduce(corner, axis=1), starts) for bound in (np.fmin, np.fmax))
+    lower, upper = (bound.reduceat(reduce(bound, corner.swapaxes(0, 1)), starts) for bound in (np.fmin, np.fmax))
     return np.stack([(lower + upper) / 2, (upper - lower) / 2], axis=1)
 
 
@@ -162,34 +196,30 @@ def _shells(faces: Integers, points: int) -> tuple[Integers, Integers]:
     return number, np.where(closed[number], keys[number], 0)
 
 
-def outer_corners(points: Reals, most: int = 64) -> Reals:
-    """Few points whose hull holds all points.
+def outer_corners(corners: Reals, most: int = 64) -> Reals:
+    """Few points whose hull holds all corners of another one.
 
-    Corners of the hull, one by one the one that is farthest outside of those before, moved away from their middle until
+    Corners, one by one the one that is farthest outside of those before, moved away from their middle until
     all others are inside.
 
     Parameters
     ----------
-    points : (n, 3), m
+    corners : (n, 3), m, of a hull
     most : how many at most, 8 at least
 
     Returns
     -------
-    corners : (k, 3), m; of flat ones the eight of their box
+    corners : (k, 3), m; of many flat ones the eight of their box
     """
-    low, high = points.min(axis=0), points.max(axis=0)
-    box = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
+    if len(corners) <= most:
+        return corners
     try:
-        corners = points[scipy.spatial.ConvexHull(points).vertices]
-        if len(corners) <= most:
-            return np.asarray(corners)
-        first = np.unique((fibonacci_sphere(FIRST) @ corners.T).argmax(axis=1))
-        hull = scipy.spatial.ConvexHull(corners[first], incremental=True)
+        hull = ConvexHull(corners[np.unique((fibonacci_sphere(FIRST) @ corners.T).argmax(axis=1))], incremental=True)
         while len(hull.points) < most:
             away = (hull.equations[:, :3] @ corners.T + hull.equations[:, 3:]).max(axis=0)
             hull.add_points(corners[[away.argmax()]])
-    except scipy.spatial.QhullError:
-        return box
+    except QhullError:
+        return np.array(list(product(*zip(corners.min(axis=0), corners.max(axis=0)))))
     kept, faces = hull.points[hull.vertices], hull.equations
     middle = kept.mean(axis=0)
     depth = -(faces[:, :3] @ middle + faces[:, 3])
@@ -210,29 +240,24 @@ def trees_of(trees: Sequence[TriangleTree | None]) -> Trees:
     trees : with roots (B,), -1 for convex bodies
     """
     own = {id(tree): tree for tree in trees if tree is not None}
-    kept = list(own.values())
-    sizes = [np.cumsum([0, *(len(getattr(tree, key)) for tree in kept)]) for key in ("box", "corner", "probe")]
-    place = {key: k for k, key in enumerate(own)}
-    child = []
-    for k, tree in enumerate(kept):
-        leaf = tree.child[:, :1] < 0
-        child.append(np.where(leaf, tree.child + np.array([0, sizes[1][k]]), tree.child + sizes[0][k]))
-    number = [place.get(id(tree), -1) for tree in trees]
-    root, first, last = (
-        np.array([bounds[k + more] if k >= 0 else -1 for k in number], np.int64)
-        for bounds, more in ((sizes[0], 0), (sizes[2], 0), (sizes[2], 1))
+    kept = list(own.values()) or [tree_of(np.eye(3), np.array([[0, 1, 2]]))]  # kernels take no empty arrays
+    parts = {part.name: [getattr(tree, part.name) for tree in kept] for part in fields(TriangleTree)}
+    begin = {key: np.cumsum([0, *map(len, each)]) for key, each in parts.items()}
+    number = [list(own).index(id(tree)) if tree is not None else -1 for tree in trees]
+    root, first, last, start = (
+        np.array([begin[key][k + more] if k >= 0 else -1 for k in number], np.int64)
+        for key, more in (("box", 0), ("probe", 0), ("probe", 1), ("hull", 0))
     )
-    none = {"box": (0, 2, 3), "slim": (0, 5, 3), "corner": (0, 3, 3), "probe": (0, 3), "shell": (0,)}
-    joined = {
-        key: np.concatenate([getattr(tree, key) for tree in kept]) if kept else np.empty(shape, float)
-        for key, shape in none.items()
-    }
-    joined["shell"] = joined["shell"].astype(np.int64)
-    joined["child"] = np.concatenate(child) if kept else np.empty((0, 2), np.int64)
-    return Trees(root=root, first=first, last=last, **joined)
+    for k, child in enumerate(parts["child"]):
+        leaves = child + np.array([0, begin["corner"][k]])
+        parts["child"][k] = np.where(child[:, :1] < 0, leaves, child + begin["box"][k])
+        parts["fan"][k] = parts["fan"][k] + begin["edge"][k]
+        parts["edge"][k] = parts["edge"][k] + begin["hull"][k]
+    joined = {key: np.concatenate(each) if len(each) > 1 else each[0] for key, each in parts.items()}
+    return Trees(root=root, first=first, last=last, start=start, **joined)
 
 
-@inner_kernel
+@borrowing_kernel
 def _frame_seen(T: Reals, S: Reals, M: Reals) -> None:
     """The frame S (4, 4) as seen from the frame T (4, 4), into M (3, 4)."""
     for r in range(3):
@@ -253,7 +278,7 @@ def _moved(M: Reals, points: Reals, n: int) -> Vector:
     )
 
 
-@inner_kernel
+@borrowing_kernel
 def _box_seen(boxes: Reals, n: int, M: Reals, seen: Reals) -> None:
     """A box of (M, 5, 3) as M (3, 4) places it, into (5, 3)."""
     for r in range(3):
@@ -288,18 +313,7 @@ def _boxes_apart(boxes: Reals, n: int, other: Reals, turn: Reals, limit: float) 
             gap -= abs(turn[r, c]) * boxes[n, 1, r]
         gap += abs(along)
         least, beyond = max(least, gap), beyond + max(gap, 0.0) ** 2
-    if least > 0:
-        return max(apart, beyond)
-    for r in range(3):
-        i, j = (r + 1) % 3, (r + 2) % 3
-        for c in range(3):
-            k, o = (c + 1) % 3, (c + 2) % 3
-            gap = abs(turn[3, j] * turn[i, c] - turn[3, i] * turn[j, c])
-            gap -= boxes[n, 1, i] * abs(turn[j, c]) + boxes[n, 1, j] * abs(turn[i, c])
-            gap -= other[1, k] * abs(turn[r, o]) + other[1, o] * abs(turn[r, k])
-            if gap > EDGE:
-                return float(gap * gap)
-    return least
+    return max(apart, beyond) if least > 0 else least
 
 
 @inlined_kernel
@@ -371,7 +385,7 @@ def _around(trees: Trees, root: int, point: Vector) -> np.int64:
     return odd
 
 
-@inner_kernel
+@borrowing_kernel
 def _ray_meets(corner: Reals, x: float, y: float, z: float) -> bool:
     """Whether the slanted ray from a point meets a triangle (3, 3): its crossings of the edges, seen along the ray."""
     odd, depth, weight = False, 0.0, 0.0
@@ -389,16 +403,73 @@ def _ray_meets(corner: Reals, x: float, y: float, z: float) -> bool:
     return bool(odd and weight != 0 and depth / weight > 0)
 
 
-@inner_kernel
-def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, M: Reals) -> bool:
-    """Whether a shell of body b, placed by S (4, 4), has its probe in body a, placed by T (4, 4); M (3, 4) gets the
-    frame S as seen from T."""
-    _frame_seen(T, S, M)
+@borrowing_kernel
+def _holds_probe(trees: Trees, a: int, b: int, M: Reals) -> bool:
+    """Whether a shell of body b, placed as M (3, 4) is seen from body a, has its probe in that."""
     for p in range(trees.first[b], trees.last[b]):
         point = _moved(M, trees.probe, p)
         if _around(trees, trees.root[a], point):
             return True
     return False
+
+
+@borrowing_kernel
+def _farthest(trees: Trees, at: int, T: Reals, way: Vector, point: Reals) -> int:
+    """The corner of a hull, placed by T (4, 4), that is farthest along a direction, uphill from corner to corner from
+    one of them on; ``point`` (3,) gets it."""
+    hull, (x, y, z) = trees.hull, way
+    u = x * T[0, 0] + y * T[1, 0] + z * T[2, 0]
+    v = x * T[0, 1] + y * T[1, 1] + z * T[2, 1]
+    w = x * T[0, 2] + y * T[1, 2] + z * T[2, 2]
+    here, best = -1, u * hull[at, 0] + v * hull[at, 1] + w * hull[at, 2]
+    while here != at:
+        here = at
+        for edge in range(trees.fan[here, 0], trees.fan[here, 1]):
+            n = trees.edge[edge]
+            value = u * hull[n, 0] + v * hull[n, 1] + w * hull[n, 2]
+            if value > best:
+                best, at = value, n
+    point[0], point[1], point[2] = _moved(T, hull, at)
+    return at
+
+
+@inner_kernel
+def hulls_distance(trees: Trees, a: int, T: Reals, b: int, S: Reals, room: Reals, near: Reals, far: float) -> float:
+    """Distance of the hulls of two surfaces.
+
+    It is that of a few corners of either; the farthest ones towards each other join them, until none is nearer.
+
+    Parameters
+    ----------
+    a, b : numbers of the bodies
+    T, S : (4, 4), m, place them
+    room : (ROOM, 3), scratch memory
+    near : (2, 3), m, with a first guess of the nearest points, gets these
+    far : m; of hulls farther away any number from ``far`` to the distance may be returned
+
+    Returns
+    -------
+    distance : m; 0 where they overlap, or where ``GROWN`` corners don't show it
+    """
+    i, j, points, zero, distance = trees.start[a], trees.start[b], np.empty((2 * GROWN, 3)), int(0), np.inf  # noqa: RUF046, UP018
+    for count in range(GROWN):
+        other = zero + GROWN + count
+        x, y, z = near[1, 0] - near[0, 0], near[1, 1] - near[0, 1], near[1, 2] - near[0, 2]
+        i = _farthest(trees, i, T, (x, y, z), points[count])
+        j = _farthest(trees, j, S, (-x, -y, -z), points[other])
+        size, gap = np.sqrt(x * x + y * y + z * z), 0.0
+        for r in range(3):
+            gap += (near[1, r] - near[0, r]) * (points[other, r] - points[count, r])
+        if gap > far * size:
+            return float(gap / size)
+        if distance * size - gap <= EXACT * size:
+            return distance
+        distance = cores_distance(
+            points, (zero, zero + count + 1, zero + GROWN, other + 1), 0.0, 0.0, room, near, np.inf
+        )
+        if distance == 0:
+            break
+    return 0.0
 
 
 @inner_kernel
@@ -411,39 +482,47 @@ def surface_distance(  # noqa: C901, PLR0912
     core: tuple[Reals, int, int, float],
     room: Reals,
     near: Reals,
-    far: float,
+    between: tuple[float, float],
 ) -> float:
     """Distance of a body's surface from another body.
 
     Parameters
     ----------
-    a, b : numbers of the bodies; b is a surface, or a convex core if it has no tree
+    a, b : numbers of the bodies; b is a surface, or a convex core if it has no tree or is -1
     T, S : (4, 4), m, place the two surfaces; S does not count for a core
     core : points (P, 3) in space, m, first and last row of the core (the last excluded), and the radius of its disc, m
     room : (ROOM, 3), scratch memory
     near : (2, 3), m, gets their closest points, if they are nearer than ``far``
-    far : m; of surfaces farther away any number from ``far`` to the distance may be returned
+    between : m, a lower bound of the distance, at which the search ends; and ``far``: of surfaces farther away any
+        number from that to the distance may be returned
 
     Returns
     -------
     distance : m; below 0 where one is inside the other, 0 where they cross
     """
-    _, first, last, disc = core
-    boxes, convex = trees.slim, trees.root[b] < 0
+    (_, first, last, disc), (least, far) = core, between
+    boxes, convex = trees.slim, b < 0 or trees.root[b] < 0
     count = last - first if convex else 3
     points, M, back = np.empty((3 + count, 3)), np.eye(3, 4), np.empty((3, 4))
     stack, bound, seen, turn = np.empty((WAITING, 2), np.int64), np.empty(WAITING), np.zeros((5, 3)), np.empty((4, 3))
     if convex:
         _core_in_frame(T, core, points, seen)
-        within = _around(trees, trees.root[a], _moved(M, points, 3)) != 0
+        within = least == 0 and _around(trees, trees.root[a], _moved(M, points, 3)) != 0
     else:
-        within = _holds_probe(trees, S, T, b, a, back)
-        within = _holds_probe(trees, T, S, a, b, M) or within
+        _frame_seen(S, T, back)
+        _frame_seen(T, S, M)
+        within = least == 0 and (_holds_probe(trees, b, a, back) or _holds_probe(trees, a, b, M))
     if within and far <= 0:  # only whether they overlap is asked
         return 0.0
     axis, close, start, other = np.zeros(3), np.empty((2, 3)), int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
-    stack[0, 0], stack[0, 1], bound[0], height, best = trees.root[a], trees.root[b], 0.0, 1, max(far, 2 * TOUCHING)
-    while height:
+    stack[0, 0], stack[0, 1], bound[0], height, best = (
+        trees.root[a],
+        trees.root[max(b, 0)],
+        0.0,
+        1,
+        max(far, 2 * TOUCHING),
+    )
+    while height and best > least + ROUNDING:
         height -= 1
         n, m, kept = stack[height, 0], stack[height, 1], height
         if bound[height] >= best * best:
@@ -486,7 +565,7 @@ def surface_distance(  # noqa: C901, PLR0912
     return -best if within else best
 
 
-@inner_kernel
+@borrowing_kernel
 def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], points: Reals, box: Reals) -> None:
     """The points of a core in a surface's frame, from row 3 of ``points`` on, and the box (5, 3) around it."""
     w, first, last, disc = core
@@ -501,16 +580,14 @@ def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], points: Reals,
         box[0, r], box[1, r], box[2 + r, r] = (low + high) / 2, (high - low) / 2 + disc, 1.0
 
 
-@inner_kernel
-def surface_above_plane(
-    trees: Trees, T: Reals, root: int, normal: tuple[float, float, float], offset: float, near: Reals
-) -> float:
-    """How far a surface stays above a half-space.
+@borrowing_kernel
+def surface_above_plane(trees: Trees, T: Reals, b: int, normal: Vector, offset: float, near: Reals) -> float:
+    """How far a surface stays above a half-space: as its hull does.
 
     Parameters
     ----------
     T : (4, 4), m, places the surface
-    root : first box of its tree
+    b : number of the body
     normal : unit vector out of the solid
     offset : m, how far along the normal the solid ends
     near : (2, 3), gets the lowest corner and its foot on the plane, m
@@ -520,31 +597,8 @@ def surface_above_plane(
     height : m, negative by the depth
     """
     x, y, z = normal
-    u = x * T[0, 0] + y * T[1, 0] + z * T[2, 0]
-    v = x * T[0, 1] + y * T[1, 1] + z * T[2, 1]
-    w = x * T[0, 2] + y * T[1, 2] + z * T[2, 2]
-    shift = x * T[0, 3] + y * T[1, 3] + z * T[2, 3] - offset
-    stack, best = np.empty(WAITING, np.int64), np.inf
-    stack[0], height = root, 1
-    while height:
-        height -= 1
-        n, box = stack[height], trees.slim[stack[height]]
-        low = u * box[0, 0] + v * box[0, 1] + w * box[0, 2]
-        for r in range(3):
-            low -= box[1, r] * abs(u * box[r + 2, 0] + v * box[r + 2, 1] + w * box[r + 2, 2])
-        if low >= best:
-            continue
-        if trees.child[n, 0] >= 0:
-            stack[height], stack[height + 1] = trees.child[n, 0], trees.child[n, 1]
-            height += 2
-            continue
-        for k in range(3):
-            corner = trees.corner[trees.child[n, 1], k]
-            value = u * corner[0] + v * corner[1] + w * corner[2]
-            if value < best:
-                best = value
-                near[0, 0], near[0, 1], near[0, 2] = _moved(T, trees.corner[trees.child[n, 1]], k)
-    above = best + shift
+    _farthest(trees, trees.start[b], T, (-x, -y, -z), near[0])
+    above = near[0, 0] * x + near[0, 1] * y + near[0, 2] * z - offset
     for r in range(3):
         near[1, r] = near[0, r] - above * normal[r]
     return float(above)
@@ -554,17 +608,24 @@ def surface_above_plane(
 def depths_inside(trees: Trees, points: Reals, found: Reals) -> None:
     """How deep points lie in a surface's closed shells.
 
+    A point less deep than the deepest before, by its way from the point looked at last, is passed over.
+
     Parameters
     ----------
     trees : of the surface, and of a body that is convex
     points : (N, 3), m, in the body's frame
-    found : (N,), gets the depths, m; 0 for points outside
+    found : (N,), gets the depths, m; 0 for points outside, and for those passed over
     """
-    T, room, near = np.eye(4), np.empty((ROOM, 3)), np.empty((2, 3))
+    T, room, near, deepest, last = np.eye(4), np.empty((ROOM, 3)), np.empty((2, 3)), 0.0, -1
     for n in range(len(points)):
-        found[n] = 0.0
+        found[n], way = 0.0, 0.0
+        for r in range(3):
+            way += (points[n, r] - points[last, r]) ** 2
+        if last >= 0 and found[last] + np.sqrt(way) <= deepest:
+            continue
         if _around(trees, trees.root[0], _moved(T, points, n)):
-            found[n] = -surface_distance(trees, 0, T, 1, T, (points, n, n + 1, 0.0), room, near, np.inf)
+            found[n] = -surface_distance(trees, 0, T, -1, T, (points, n, n + 1, 0.0), room, near, (0.0, np.inf))
+            deepest, last = max(deepest, found[n]), n
 
 
 @kernel

@@ -106,11 +106,11 @@ def read_stl(path: Path, link: int, checksum: str) -> LinkMesh:
 
 
 def _surface(loaded: Any, scale: Reals | float) -> tuple[Reals, Integers, bool]:
-    """Vertices (V, 3) times ``scale``, and faces (F, 3), outwards if the mesh is closed; and whether it is."""
+    """Vertices (V, 3) times ``scale``, faces (F, 3), and whether it is closed: then outwards, where they have sides."""
     loaded.merge_vertices()
     loaded.vertices = loaded.vertices * scale
     closed = bool(loaded.is_watertight)
-    if closed:
+    if closed and loaded.is_winding_consistent:
         loaded.fix_normals()
     return np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64), closed
 

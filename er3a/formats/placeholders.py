@@ -14,8 +14,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from er3a.collision.shapes import arm_shapes
-from er3a.dynamics.arm_model import link_shapes
+from er3a.dynamics.arm_model import LinkShape, link_shapes
 from er3a.dynamics.plausibility import mass_findings
 from er3a.finding import is_one
 from er3a.numerics.arrays import Reals
@@ -86,8 +85,13 @@ def _no_masses(robot: Robot) -> str:
     moments = [np.linalg.eigvalsh(each.body.inertia_matrix) for each in links]
     if len(moments) >= SEVERAL and np.allclose(moments, moments[0][0]):
         return f"all links have the moment of inertia {moments[0][0]:g} kg m2 about each axis"
-    away = {each.link: _outside(robot, each.link, np.array(each.body.centre)) for each in links}
-    if far := {link: distance for link, distance in away.items() if distance > OUTSIDE_M}:
+    shapes = link_shapes(robot) if links else {}
+    far = {
+        each.link: away
+        for each in links
+        if (away := _outside(robot, shapes.get(each.link), each.link, each.body.centre)) > OUTSIDE_M
+    }
+    if far:
         link = max(far, key=far.__getitem__)
         more = f" and {len(far) - 1} more" if len(far) > 1 else ""
         return f"the centre of mass of link {link}{more} is {1000 * far[link]:.0f} mm outside of the link"
@@ -97,11 +101,10 @@ def _no_masses(robot: Robot) -> str:
     return ""
 
 
-def _outside(robot: Robot, link: int, centre: Reals) -> float:
+def _outside(robot: Robot, shape: LinkShape | None, link: int, centre: tuple[float, ...]) -> float:
     """How far (m) a centre (3,) is outside of the hull of what a link is drawn with; -inf where nothing is."""
     parts = [visual.points for visual in robot.visuals if visual.link == link]
-    if arm_shapes(robot).given and link in (shapes := link_shapes(robot)):
-        parts.append(shapes[link].points)
+    parts += [shape.points] if shape and not shape.guessed else []
     if not parts:
         return -math.inf
     hull = scipy.spatial.ConvexHull(np.concatenate(parts), qhull_options="QJ")

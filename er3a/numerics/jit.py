@@ -34,7 +34,7 @@ except ModuleNotFoundError:  # no numba
     machine_code = None
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_KERNEL = b"kernel\ndef "  # @kernel, @inner_kernel or @inlined_kernel
+_KERNEL = b"kernel\ndef "  # @kernel, @inner_kernel and so on
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -102,7 +102,7 @@ def kernel(function: Function) -> Function:
     No fastmath and no contraction across operations: results must not depend on the machine's vector width. Kernels
     release the interpreter's lock, so threads can run them side by side.
     """
-    return machine_code.compiled(function, kernels_folder()) if machine_code else np.errstate(all="ignore")(function)
+    return _compiled(function if machine_code else np.errstate(all="ignore")(function))
 
 
 def inner_kernel(function: Function) -> Function:
@@ -121,7 +121,25 @@ def inner_kernel(function: Function) -> Function:
     Leaving the entry out spares a sixth of the compiling. A literal as an argument, alone or in a tuple, compiles the
     function once more for that number; ``int(0)`` does not.
     """
-    return machine_code.compiled(function, kernels_folder(), no_cpython_wrapper=True) if machine_code else function
+    return _compiled(function, no_cpython_wrapper=True, _nrt=True)
+
+
+def borrowing_kernel(function: Function) -> Function:
+    """Compile an inner kernel that makes no array and returns none, so that it need not count who holds its arguments.
+
+    Parameters
+    ----------
+    function : as for :func:`inner_kernel`; numba refuses one that assigns a slice, or makes an array
+
+    Returns
+    -------
+    function : as of :func:`inner_kernel`
+
+    Notes
+    -----
+    A tuple of thirty arrays is counted thirty times at each call, which took half of the time of a collision question.
+    """
+    return _compiled(function, no_cpython_wrapper=True, _nrt=False)
 
 
 def inlined_kernel(function: Function) -> Function:
@@ -136,7 +154,11 @@ def inlined_kernel(function: Function) -> Function:
     -------
     function : must not be called from Python, unless numba is switched off (``NUMBA_DISABLE_JIT``)
     """
-    return machine_code.compiled(function, kernels_folder(), inline="always") if machine_code else function
+    return _compiled(function, inline="always")
+
+
+def _compiled(function: Function, **asked: bool | str) -> Function:
+    return machine_code.compiled(function, kernels_folder(), **asked) if machine_code else function
 
 
 # Enough parts that a thread on a busy processor is outrun by the others, few enough that handing out costs nothing.
