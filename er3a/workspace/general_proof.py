@@ -33,7 +33,7 @@ import numpy as np
 
 from er3a.geometry.vectors import TURN, Vector, add, cross, dot, scaled, subtract
 from er3a.numerics.arrays import Integers, Reals, copy_values
-from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.jit import borrowing_kernel, kernel
 from er3a.workspace.arcs import MAX_ARCS, ROUND_OFF, Cell, measure, meets, remove
 from er3a.workspace.cells import Proof, refined
 from er3a.workspace.general_arm import GeneralArm, curvature, place, point_of
@@ -128,19 +128,19 @@ def memory(arm: GeneralArm) -> Memory:
     )
 
 
-@inner_kernel
+@borrowing_kernel
 def _radius(arm: GeneralArm, x: float, y: float) -> float:
     """Distance from axis 1 (m), or the place across bars."""
     return x if arm.bar > 0.0 else np.sqrt(x * x + y * y)
 
 
-@inner_kernel
+@borrowing_kernel
 def _azimuth(arm: GeneralArm, x: float, y: float) -> float:
     """Azimuth about axis 1 (rad), or the place along bars."""
     return y * TURN / arm.bar if arm.bar > 0.0 else np.arctan2(y, x)
 
 
-@inner_kernel
+@borrowing_kernel
 def _values(arm: GeneralArm, v: Reals, theta: Reals) -> None:
     """Row values of joint values, with joint 1 at 0."""
     n, m = arm.drive.shape
@@ -152,7 +152,7 @@ def _values(arm: GeneralArm, v: Reals, theta: Reals) -> None:
         theta[k] = total
 
 
-@inner_kernel
+@borrowing_kernel
 def _allowed(arm: GeneralArm, v: Reals) -> bool:
     """Whether joint values respect the limits of sums."""
     for r in range(arm.combined.shape[0]):
@@ -164,7 +164,7 @@ def _allowed(arm: GeneralArm, v: Reals) -> bool:
     return True
 
 
-@inner_kernel
+@borrowing_kernel
 def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimuth: float) -> None:
     """Add joint values to the list, unless their bucket is full. Kernel.
 
@@ -207,7 +207,7 @@ def sample(arm: GeneralArm, unit: Reals, known: Postures, memory: Memory) -> Non
         keep(arm, known, memory.v, _radius(arm, x, y), z, _azimuth(arm, x, y))
 
 
-@inner_kernel
+@borrowing_kernel
 def _slopes(arm: GeneralArm, memory: Memory) -> tuple[float, float, float]:
     """Radius, height (m) and azimuth (rad) at ``memory.v``, their slopes and the weights of the joints."""
     _values(arm, memory.v, memory.theta)
@@ -232,7 +232,7 @@ def _slopes(arm: GeneralArm, memory: Memory) -> tuple[float, float, float]:
     return rho, z, _azimuth(arm, x, y)
 
 
-@inner_kernel
+@borrowing_kernel
 def _directions(memory: Memory, hold: float) -> bool:
     """Smallest weighted changes of the joints that change radius or height alone; False where there are none.
 
@@ -260,7 +260,7 @@ def _directions(memory: Memory, hold: float) -> bool:
     return True
 
 
-@inner_kernel
+@borrowing_kernel
 def _approach(arm: GeneralArm, rho: float, z: float, near: float, hold: float, memory: Memory) -> bool:
     """Move ``memory.v`` until the tool point is within ``near`` (m) of a point of the section; sets the directions."""
     best = np.inf
@@ -285,7 +285,7 @@ def _approach(arm: GeneralArm, rho: float, z: float, near: float, hold: float, m
     return False
 
 
-@inner_kernel
+@borrowing_kernel
 def _misses(x_0: float, y_0: float, x_1: float, y_1: float, w: float, h: float) -> bool:
     """Whether a segment misses the rectangle of half-widths w and h about the origin."""
     if min(x_0, x_1) > w or max(x_0, x_1) < -w or min(y_0, y_1) > h or max(y_0, y_1) < -h:
@@ -293,7 +293,7 @@ def _misses(x_0: float, y_0: float, x_1: float, y_1: float, w: float, h: float) 
     return bool(abs(x_0 * y_1 - x_1 * y_0) > abs(y_1 - y_0) * w + abs(x_1 - x_0) * h)
 
 
-@inner_kernel
+@borrowing_kernel
 def _winds(arm: GeneralArm, cell: Cell, scale: float, memory: Memory) -> bool:
     """Whether the parallelogram about ``memory.v``, so many times a rectangle, winds around it; keeps its corners."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
@@ -339,7 +339,7 @@ def _winds(arm: GeneralArm, cell: Cell, scale: float, memory: Memory) -> bool:
     return winding != 0
 
 
-@inner_kernel
+@borrowing_kernel
 def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float, float]:
     """Range of azimuths (rad) of the points that the parallelogram reaches in the rectangle, about ``memory.v``.
 
@@ -355,7 +355,8 @@ def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float,
         return False, 0.0, 0.0
     ux, uy = (x / rho, y / rho) if arm.bar == 0.0 else (1.0, 0.0)
     low = high = inward = 0.0
-    memory.moves[:] = 0.0
+    for k in range(n):
+        memory.moves[k] = 0.0
     for c in range(memory.thetas.shape[0]):
         aside = along = 0.0
         for k in range(1, n):
@@ -374,7 +375,7 @@ def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float,
     return True, middle + np.arcsin(low) - ROUND_OFF, middle + np.arcsin(high) + ROUND_OFF
 
 
-@inner_kernel
+@borrowing_kernel
 def _covers_axis(arm: GeneralArm, cell: Cell, memory: Memory) -> bool:
     """Whether the joints after joint 1 take the point all over the box about axis 1 that holds a ring.
 
@@ -419,15 +420,15 @@ def _covers_axis(arm: GeneralArm, cell: Cell, memory: Memory) -> bool:
         change[j] = w * (abs(dot(along, inverse[0])) + abs(dot(along, inverse[1])) + abs(dot(along, inverse[2])))
         if change[j] > min(memory.v[j] - arm.v_lower[j], arm.v_upper[j] - memory.v[j]):
             return False
-    memory.moves[:] = 0.0
-    for k in range(1, n):
-        for j in range(m):
+    for k in range(n):
+        memory.moves[k] = 0.0
+        for j in range(m if k else 0):
             memory.moves[k] += abs(arm.drive[k, j]) * change[j]
     # The hundredth is for the rounding of the inverse.
     return bool(far + 0.5 * curvature(arm, memory.moves, memory.radii) < 0.99 * half)
 
 
-@inner_kernel
+@borrowing_kernel
 def _column(arm: GeneralArm, columns: Reals, j: int) -> Vector:
     """Derivative (m) of the point by a joint value, joint 1 at rest."""
     total = (0.0, 0.0, 0.0)
@@ -436,7 +437,7 @@ def _column(arm: GeneralArm, columns: Reals, j: int) -> Vector:
     return total
 
 
-@inner_kernel
+@borrowing_kernel
 def _try(arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memory, arcs: Reals, count: int) -> int:
     """Fill a ring from ``memory.v``; returns the count of what is left open."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
