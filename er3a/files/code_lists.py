@@ -253,9 +253,9 @@ class Lists:
                     key: Any = part.strip("'\"@.").lower()
                     if isinstance(value, list) and key != ":":
                         key = int(amount_of(key).number) - {"[": self.first, "@": 0}.get(index[0], 1)
-                        value = value[key] if key >= 0 else {}[key]
-                    elif key != ":":
-                        value = value[key]
+                        if key < 0:
+                            raise IndexError(key)
+                    value = value if key == ":" else value[key]
         except (KeyError, IndexError, ValueError, TypeError):
             return found[0]
         self.taken.add(found[1])
