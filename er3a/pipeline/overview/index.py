@@ -211,7 +211,7 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
 
 
 def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Mapping[str, Results]) -> list[Any]:
-    """Which numbers are wrong, which paths may run, where the tray goes: as far as the study asks."""
+    """Which numbers are wrong, which paths fail, where the tray goes: as far as the study asks."""
     trusted = [entry.name for entry in entries if entry.use != "never"]
     found = [
         table_tile(doubtful, stored[doubtful]),
