@@ -281,7 +281,7 @@ def write_panel(
     opened = rows[(Bodies(robot, scene).free(rows, NEAR_TOUCH) & ~near.contains(robot, rows)).argmax()]
     solids = drawn_scene(scene.solids if scene else (), robot)
     panel = own | {
-        "wrong": bool(first_caveat) and first_caveat.status == "fail",
+        "wrong": first_caveat is not None and first_caveat.status == "fail",
         "scene": solids,
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "floor": floor_of(scene),
