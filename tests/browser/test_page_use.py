@@ -189,29 +189,31 @@ def test_back_leads_to_where_one_was(browser, small_study):
     WebDriverWait(browser, PAUSE).until(lambda _: abs(browser.execute_script(place) - before) < 2)
 
 
-def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
-    browser.get((small_study.folder / "reports/index.html").as_uri())
-    field = browser.find_element(By.CSS_SELECTOR, ".find input")
+def found_on(browser, address, text):
+    """The links that the search of an open page has to a page."""
     browser.find_element(By.TAG_NAME, "body").send_keys("/")
-    assert browser.switch_to.active_element == field
-    field.send_keys("line_collides er3a-c60")
-    WebDriverWait(browser, PAUSE).until(lambda _: browser.find_elements(By.CSS_SELECTOR, ".elsewhere a"))
-    links = browser.find_elements(By.CSS_SELECTOR, ".elsewhere a")
-    assert {link.get_attribute("href").rsplit("/", 1)[1].split("?")[0] for link in links} >= {"trajectory.html"}
-    link = next(link for link in links if "er3a_c60/trajectory.html" in link.get_attribute("href"))
-    browser.get(link.get_attribute("href"))
     field = browser.find_element(By.CSS_SELECTOR, ".find input")
-    field.clear()
-    field.send_keys("line_collides")
-    rows = browser.find_elements(By.CSS_SELECTOR, "#table-paths tbody tr")
-    assert [row.find_element(By.TAG_NAME, "a").text for row in rows if row.is_displayed()] == ["line_collides"]
-    heading = browser.find_element(By.ID, "line_collides")
-    assert heading.is_displayed()
-    assert not browser.find_element(By.ID, "line_out").is_displayed()
-    assert browser.current_url.endswith("?find=line_collides")
-    field.clear()
-    field.send_keys("x" + Keys.BACKSPACE)
-    assert not browser.find_elements(By.CLASS_NAME, "unfound")
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.switch_to.active_element == field)
+    field.send_keys(text)
+    own = f'.find a[href*="{address}"]'
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.find_elements(By.CSS_SELECTOR, own))
+    return browser.find_elements(By.CSS_SELECTOR, own)
+
+
+def test_a_search_has_a_layer_of_its_own_and_leaves_the_page_as_it_is(browser, small_study):
+    browser.get((small_study.folder / "reports/er3a_c60/trajectory.html").as_uri())
+    laid = (
+        "return [...document.querySelectorAll('main, .hero, .runs li')]"
+        ".map((part) => Object.values(part.getBoundingClientRect().toJSON()))"
+    )
+    shown = "return performance.getEntriesByName('player').length > 0"
+    WebDriverWait(browser, PAUSE).until(lambda own: own.execute_script(shown))
+    before = browser.execute_script(laid)
+    assert "er3a_c60/inverse.html" in found_on(browser, "er3a_c60/inverse.html", "solutions")[0].get_attribute("href")
+    layer = browser.find_element(By.CSS_SELECTOR, ".find > div").rect
+    assert layer["y"] >= browser.find_element(By.CSS_SELECTOR, ".find > summary").rect["y"] + 20
+    assert layer["x"] >= 0
+    assert browser.execute_script(laid) == before
 
 
 @pytest.mark.parametrize(
@@ -223,11 +225,9 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
         ("er3a_c60/teach.html", "Tool pose"),
     ],
 )
-def test_the_index_finds_headings_and_captions_of_a_page_and_leads_to_it(browser, small_study, page, text):
-    browser.get((small_study.folder / "reports/index.html").as_uri() + f"?find={text.replace(' ', '+')}")
-    own = f'.elsewhere a[href^="{page}"]'
-    WebDriverWait(browser, PAUSE).until(lambda _: browser.find_elements(By.CSS_SELECTOR, own))
-    place = browser.find_elements(By.CSS_SELECTOR, own)[1]  # behind the page's title
+def test_a_search_finds_headings_and_captions_of_a_page_and_leads_to_them(browser, small_study, page, text):
+    browser.get((small_study.folder / "reports/index.html").as_uri())
+    place = found_on(browser, page, text)[1]  # behind the page's title
     assert text in place.text
     browser.get(place.get_attribute("href"))
     if page.endswith("teach.html"):
@@ -242,29 +242,12 @@ def test_the_index_finds_headings_and_captions_of_a_page_and_leads_to_it(browser
 
 def test_a_place_inside_of_a_program_shows_that_program_whole_with_its_player(browser, small_study):
     page = (small_study.folder / "reports/er3a_c60/programs.html").as_uri()
-    browser.get(f"{page}?find=singular_line&at=1DEFsingular_line")
+    browser.get(f"{page}?at=1DEFsingular_line")
     assert "DEF singular_line" in browser.find_element(By.CLASS_NAME, "sought").text
-    assert browser.find_element(By.CSS_SELECTOR, ".find input").get_property("value") == ""
-    assert not browser.find_elements(By.CLASS_NAME, "unfound")
     assert browser.find_element(By.CSS_SELECTOR, ".player canvas").is_displayed()
     assert browser.find_element(By.ID, "singular_line").is_displayed()
     assert not browser.find_element(By.ID, "out_of_reach").is_displayed()
     assert browser.find_element(By.CSS_SELECTOR, ".player select.motion").get_property("value") == "singular_line"
-
-
-@pytest.mark.parametrize(
-    ("page", "words", "warning"),
-    [
-        ("er3a_c60_article/workspace.html", "volume", ".answer, .before"),
-        ("er3a_c60/trajectory.html", "line_clean", ".answer, .chip"),
-    ],
-)
-def test_no_warning_is_hidden_by_a_search(browser, small_study, page, words, warning):
-    browser.get(f"{(small_study.folder / 'reports' / page).as_uri()}?find={words.replace(' ', '+')}")
-    assert browser.find_elements(By.CSS_SELECTOR, "main.finding .unfound")
-    warnings = browser.find_elements(By.CSS_SELECTOR, f"main :is({warning})")
-    assert warnings
-    assert [each.get_attribute("outerHTML")[:80] for each in warnings if not each.is_displayed()] == []
 
 
 def test_a_row_that_an_address_leads_to_has_the_heads_of_its_columns(browser, small_study):

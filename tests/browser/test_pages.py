@@ -63,7 +63,7 @@ def check_clean(browser) -> None:
     assert all(alt for alt, _ in images)
     loaded = browser.execute_script("return performance.getEntriesByType('resource').map(entry => entry.name)")
     others = {address.rsplit("/", 1)[-1] for address in loaded if not address.startswith(("data:", "blob:"))}
-    assert others <= {"marks.js"}  # what the index leaves for the marks in headers
+    assert others <= {"marks.js"}  # what the index leaves for headers
 
 
 def test_page_is_accessible(browser, page):

@@ -532,7 +532,7 @@ def test_the_player_marks_what_fails_and_says_so_of_paths_near_assumed_shapes_to
     (shown,) = motions(robot, replace(results, summary=replace(results.summary, paths=(near,), verdict=verdict)))
     (event,) = (each for each in shown.events if each.status != "plain")
     assert shown.text == event.text
-    assert event.text.startswith("link 4 and post: 11.0 mm clear; assumed shapes")
+    assert event.text.startswith("link 4 and post: least gap 11.0 mm; assumed shapes")
     assert event.bodies == ("link_4", "post")
     assert event.t <= 2.4 <= event.until
     measured = results.clearance.take(results.clearance.path == "line_collides")

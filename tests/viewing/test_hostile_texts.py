@@ -26,7 +26,7 @@ from er3a.pipeline.viewing.recording import escaped
 ROBOT = "er3_600"
 HOSTILE = """ <script>alert("x")</script><img src=http://x/y onerror=alert(1)> $x^$ {{ 7*7 }} </style> ' " &amp;"""
 FROM_FILES = ("title", "note", "source")
-MARKS = "../marks.js"  # what the index leaves for the marks in headers of a robot's pages
+MARKS = "../marks.js"  # what the index leaves for the headers of a robot's pages
 LOADED = {"src", "srcset", "data", "poster", "background", "action"}
 
 
@@ -126,7 +126,7 @@ def test_the_page_over_all_robots_does_neither(hostile, small_study, tmp_path):
     found, usual = Tags(html), Tags((small_study.folder / "reports/index.html").read_text(encoding="utf-8"))
     assert found.counts["script"] == usual.counts["script"]
     assert found.handlers == []
-    assert found.from_elsewhere == []
+    assert found.from_elsewhere == ["marks.js"]
     assert "&lt;script&gt;alert(" in html
 
 
@@ -134,7 +134,7 @@ def test_no_page_names_anything_else_to_load(small_study):
     reports = small_study.folder / "reports"
     for page in reports.rglob("*.html"):
         html = page.read_text(encoding="utf-8")
-        assert Tags(html).from_elsewhere == ([] if page.parent == reports else [MARKS]), page
+        assert Tags(html).from_elsewhere == ["marks.js" if page.parent == reports else MARKS], page
         styles = "".join(re.findall(r"<style>(.*?)</style>", html, flags=re.DOTALL))
         assert not re.search(r"@import|url\(\s*['\"]?(?!data:)", styles), page
 

@@ -136,7 +136,7 @@ TEXTS = texts(
         "configuration_not_met": "no solution within the limits, or not the line's end, has the configuration {text}",
         "whole_turn": "J{joint} turns by {angle_deg:.1f}°; its nearest equivalent is {nearest_deg:.1f}° away",
         "joint_jumps": "J{joint} turns by {angle_deg:.1f}° while the tool moves {moved_mm:.1f} mm",
-        "clear_of_assumed": "{pair}: {clearance_mm:.1f} mm clear; assumed shapes may be off by {margin_mm:g} mm",
+        "clear_of_assumed": "{pair}: least gap {clearance_mm:.1f} mm; assumed shapes may be off by {margin_mm:g} mm",
         "clearance_not_proven": "clear at points of the way; not settled between them in the given time",
         "zone_collides": "blending zone allows a collision ({assumed:shapes}): {pair}, {depth_mm:.1f} mm deep",
         "zone_too_large": "zone larger than its line: {zone_mm:.1f} > {motion_mm:.1f} mm",

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from functools import singledispatch
 
+import numpy as np
+
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.collision.model import CollisionResults
 from er3a.pipeline.stages.dynamics.model import DynamicsResults
 from er3a.pipeline.stages.inverse.model import InverseResults
@@ -50,7 +53,7 @@ def _(results: ValidationResults) -> Glance:
         return value, tr("sources differ by {off}", off=with_unit(fixed(max(stated) - min(stated), 1), conflict.unit))
     if not evidence or not evidence.unconfirmed:
         return value, ""
-    return value, tr("{count} to confirm", count=len(evidence.unconfirmed))
+    return tr("{count} to confirm", count=len(evidence.unconfirmed)), joined([value, tr("checks")], " ")
 
 
 @glance.register
@@ -63,8 +66,12 @@ def _(results: WorkspaceResults) -> Glance:
 
 @glance.register
 def _(results: CollisionResults) -> Glance:
-    free = next((each.value for each in results.summary.figures if each.name == "free_of_collisions"), None)
-    return with_unit(fixed(float(free), 0), "%") if free is not None else "–", tr("joint space free")
+    params, closest = results.summary.verdict.finding.params, results.summary.closest
+    partly = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())  # these are clear of nothing
+    clear = sum(each.clearance_mm >= 0 and each.name not in partly for each in closest)
+    hit = sum(each.clearance_mm < 0 for each in closest) + len(params.get("blocked", ()))
+    caught = len(params.get("demonstrations", ()))
+    return f"{clear}/{clear + hit - caught}", _caught(caught)
 
 
 @glance.register

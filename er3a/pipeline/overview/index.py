@@ -89,9 +89,6 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
-        places=page.packed_text(
-            json.dumps([*places(study, folder, {entry.name for entry in wrong})], ensure_ascii=False)
-        ),
         entries=entries,
         stages=_asked(study),
         questions={name: stage.question for name, stage in STAGES.items()},
@@ -102,7 +99,8 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         command=page.run_command(study, "index.html"),
         provenance=Provenance(inputs=result_records(results, study.names), code=code_digest(), seed=study.seed),
     )
-    _write_marks(entries, folder / "marks.js")
+    found = places(study, folder, {entry.name for entry in wrong})
+    _write_marks(entries, page.packed_text(json.dumps([*found], ensure_ascii=False)), folder / "marks.js")
     write_junit(verdicts, folder / "junit.xml")
 
 
@@ -213,7 +211,7 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
 
 
 def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Mapping[str, Results]) -> list[Any]:
-    """Which numbers are wrong, which paths may run, where the tray goes: as far as the study asks."""
+    """Which numbers are wrong, which paths fail, where the tray goes: as far as the study asks."""
     trusted = [entry.name for entry in entries if entry.use != "never"]
     found = [
         table_tile(doubtful, stored[doubtful]),
@@ -227,7 +225,7 @@ def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Map
     return [tile for tile in found if tile]
 
 
-def _write_marks(entries: Sequence[RobotRow], file: Path) -> None:
-    """What each stage of each robot came to, for the marks in the headers of their pages."""
+def _write_marks(entries: Sequence[RobotRow], found: str, file: Path) -> None:
+    """What pages need of all: what each stage of each robot came to, for marks in headers, and what is found where."""
     marks = {entry.name: {cell.stage: cell.status for cell in entry.cells if cell} for entry in entries}
-    write_text(file, f"globalThis.MARKS = {json.dumps(marks, sort_keys=True)};\n")
+    write_text(file, f'globalThis.MARKS = {json.dumps(marks, sort_keys=True)};\nglobalThis.PLACES = "{found}";\n')

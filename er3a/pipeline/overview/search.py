@@ -1,4 +1,4 @@
-"""What the index searches: headings, rows and captions of all pages."""
+"""What the search finds: headings, rows and captions of all pages."""
 
 from __future__ import annotations
 

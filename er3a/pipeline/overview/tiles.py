@@ -1,4 +1,4 @@
-"""The index's tiles: which numbers are wrong, which paths and programs may run, where the tray goes."""
+"""The index's tiles: which numbers are wrong, which paths and programs fail, where the tray goes."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def table_tile(name: str, stored: Results) -> Tile | None:
 
 
 def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
-    """Which paths or programs of a robot may run, each with its bar over time.
+    """Which paths or programs of a robot fail, each with its bar over time.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
     page = f"{name}/{found.stage}.html"
-    asked = tr("Which {what} may run?", what=what)
+    asked = tr("Which {what} fail?", what=what)
     return Tile(asked, said.headline, said.rest, sound, page, rows=rows[:FEW], more=len(rows[FEW:]))
 
 

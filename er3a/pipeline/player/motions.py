@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any, Literal
 from urllib.parse import urlencode
 
@@ -170,9 +169,6 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0) -
     fails = fault.status == "fail"
     events = motion.events if motion else ()
     gravest = min(((each.t, each.until) for each in events if each.status == fault.status), default=None)
-    fix = fix_of([fault])
-    if fix and not fix.address and fails and gravest and gravest[0] < gravest[1]:  # what is wrong is played
-        fix = replace(fix, address=fault.address.replace("#", f"&until={gravest[1]:.9g}#"))
     return ListRow(
         "fail" if fails else "caution",
         fault.name,
@@ -181,7 +177,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0) -
         (fault.name, gravest[0] if gravest and fails else fault.moments[0].seen_s or 0.0) if motion else None,
         float(bool(parts)),
         parts,
-        fix,
+        fix_of([fault]),
     )
 
 

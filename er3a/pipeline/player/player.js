@@ -119,12 +119,13 @@ function draw() {
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
   arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value, k === 0 && Boolean(wrong)));
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
-  const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  const numbered = others.map((own, k) => sticks(own, data.solutions[k], poses[0]));
+  const others = wrong ? [] : motion.ghosts.map((q) => posesOf(arms[0], q));
+  const shades = motion.events.map(({ status }) => data.colours[status] ?? page.muted);
+  const numbered = others.map((own, k) => sticks(own, shades[k], poses[0]));
   const keys = numbered.map((at) => at.map((value) => value.toFixed(2)).join());
   for (const key of others.length > 1 ? new Set(keys) : []) {
     const those = keys.flatMap((own, k) => (own === key ? [k + 1] : []));
-    if (key) space.word(those.join(", "), numbered[those[0] - 1], space.page.muted, false);
+    if (key) space.word(those.join(", "), numbered[those[0] - 1], shades[those[0] - 1], false);
   }
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && (touching.has(mesh.shape.name) ? SEEN_THROUGH : FAINT));
@@ -209,11 +210,12 @@ function nameEnds(trail) {
 function tell() {
   if (bar.dataset.motion !== motion.name) newMotion();
   bar.value = String(t);
-  const [at, last, said] = motion.ghosts.length > 1 ? [String(Math.floor(t) + 1), String(motion.events.length), words.solution] : [fixed(t), fixed(whole()), words.clock];
+  const several = motion.ghosts.length > 1; // a second for each solution
+  const [at, last, said] = several ? [String(Math.floor(t) + 1), String(Math.ceil(end())), words.solution] : [fixed(t), fixed(whole()), words.clock];
   clock.textContent = said.replace("{t}", at).replace("{end}", last);
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
-  const ends = playedUntil() < end() ? words.ends : apart ? words.apart.replace("{off}", apart) : motion.text;
+  const ends = playedUntil() < end() ? words.ends : apart ? (several ? clock.textContent + words.between : "") + words.apart.replace("{off}", apart) : motion.text;
   show(nowShown, (now[0]?.status === "plain" ? now.at(-1) : now[0])?.text || ends); // the first fault is the cause
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
@@ -376,7 +378,7 @@ document.querySelector(".hero .fix a")?.addEventListener("click", (event) => {
   event.preventDefault();
   place.classList.remove("docked");
   place.scrollIntoView({ block: "nearest" });
-  play(t < playedUntil());
+  play(asked.has("until") && t < playedUntil()); // or else the moment is what is to be seen
 });
 const row = document.querySelector(".runs [aria-current][data-t]"); // of the page's list, if its address names one
 const named = decodeURIComponent(location.hash.slice(1));

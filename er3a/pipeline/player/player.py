@@ -19,7 +19,7 @@ from er3a.pipeline.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion, Weight
 from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at, stand
 from er3a.pipeline.viewing.page import packed_text, page_environment
-from er3a.pipeline.viewing.palette import DOUBTFUL, INK, SOLUTIONS, TOUCHING
+from er3a.pipeline.viewing.palette import BODY, DOUBTFUL, INK, TOUCHING
 from er3a.pipeline.viewing.still import (
     AZIMUTH,
     DISTANCE,
@@ -163,7 +163,6 @@ def _data(
         "colours": {"touching": TOUCHING, **COLOURS},
         "axes": AXES,
         "floor": floor,
-        "solutions": SOLUTIONS,
         "scene": drawn_scene(scene.solids if scene else (), robot),
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "motions": [_motion(motion, most) for motion in motions],
@@ -202,12 +201,15 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, 
 
 
 def best_turn(robot: Robot, motion: PlayedMotion, t: float, data: dict[str, Any]) -> float:
-    """By how much (rad) the eye is turned to see the arm at a time (s), and its way, from the side, walls along them,
-    and no body before it."""
+    """By how much (rad) the eye is turned to see the arm at a time (s), its way and what is measured then from the
+    side, walls along them, and no body before it."""
     q, way = [_at(motion, motion.q, t), *motion.ghosts], forward(robot, motion.q)[:, :3, 3]
     joints = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
     bodies = [(_corners(shape), shape.get("large")) for shape in data["scene"] if "pale" not in shape]
     points = np.concatenate([joints, (joints[:, 1:] + joints[:, :-1]) / 2], axis=1)
+    gaps = [np.subtract(mark.end, mark.start) for mark in motion.marks if mark.t0 <= t <= mark.t1 and mark.text]
+    if any(event.status == "fail" and event.t <= t <= event.until for event in motion.events):
+        gaps = []  # what is inside is seen from no side
     margin = MARGIN * data["size"] / 2
     whole = np.linalg.norm(np.diff(joints, axis=1), axis=2).sum()
     best = []
@@ -216,6 +218,7 @@ def best_turn(robot: Robot, motion: PlayedMotion, t: float, data: dict[str, Any]
         seen = points @ axes
         long = np.linalg.norm(np.diff((joints @ axes)[..., :2], axis=1), axis=2).sum() / whole
         long += WAY_COUNTS * np.linalg.norm(np.ptp((way @ axes)[:, :2], axis=0)) / data["size"]
+        long += sum(np.linalg.norm((gap @ axes)[:2]) / np.linalg.norm(gap) for gap in gaps if gap.any())
         hidden = np.zeros(seen.shape[:2], dtype=bool)
         for corners, large in bodies:
             own = corners @ axes
@@ -241,8 +244,8 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
     values = (motion.q, *motion.beside)
     poses = [poses_at(robot, _at(motion, q, t)) for robot, q in zip(robots, values)]
     picture = scene_still(data, poses, colours, data["turned"])
-    for q, colour in zip(motion.ghosts, SOLUTIONS):
-        picture.line(poses_at(robots[0], q)[:, :3, 3], colour, 3.0)
+    for q, event in zip(motion.ghosts, motion.events):
+        picture.line(poses_at(robots[0], q)[:, :3, 3], COLOURS.get(event.status, BODY), 3.0)
     for robot, q in zip(robots, values):
         picture.line(forward(robot, q[_shown(motion, MAX_FRAMES)])[:, :3, 3], INK, 2.0)
     for mark in motion.marks:

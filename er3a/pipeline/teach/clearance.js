@@ -64,16 +64,10 @@ export class Clearance {
     Object.assign(this, { table, clearance, words });
   }
 
-  /** What overlaps at frames `T`, in words; empty where nothing does. */
+  /** What overlaps at frames `T`, in few words; empty where nothing does. */
   overlap(T) {
     const found = nearestPair(this.clearance, this.table.base, T);
-    return found && found.distance <= 0 ? this.#described(found) : "";
-  }
-
-  #described({ distance, deep, pair }) {
-    const words = this.clearance.assumed ? this.words.assumed : this.words;
-    const text = distance <= 0 ? (deep ? words.overlap_deep : words.overlap) : words.clearance_is;
-    return fill(text, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
+    return found && found.distance <= 0 ? fill(this.words.collides, { pair: found.pair.text }) : "";
   }
 
   /** Writes the least distance at frames `T` into the page; returns what is to be drawn of it, null for nothing. */
@@ -89,7 +83,8 @@ export class Clearance {
     const { distance, deep, pair } = found;
     const touching = distance <= 0;
     element.dataset.state = touching ? "at" : distance < this.clearance.near ? "near" : "clear";
-    write(element, this.#described(found));
+    const said = this.clearance.assumed ? words.assumed : words;
+    write(element, fill(touching ? (deep ? said.overlap_deep : said.overlap) : said.clearance_is, { distance: inMillimetres(Math.abs(distance)), pair: pair.text }));
     return { from: found.from, to: found.to, text: deep ? "" : inMillimetres(distance), touching: touching ? pair.names : [] };
   }
 }

@@ -42,7 +42,7 @@ const clearance = new Clearance(data);
 const list = new SolutionList(data, arm, goTo, (other) => {
   ghost = other;
   refresh();
-}, (other) => clearance.overlap(frames(table, links, other)));
+}, (other) => (data.wrong ? "" : clearance.overlap(frames(table, links, other))));
 
 /** The joint values (rad, m) that the arm stands at. */
 export const joints = () => [...q];
@@ -192,7 +192,7 @@ function refresh() {
 function frame(now) {
   awaited = false;
   const T = frames(table, links, q);
-  view.show(q, ghost, showRow(), clearance.show(T), byId("looks")?.value);
+  view.show(q, ghost, showRow(), data.wrong ? null : clearance.show(T), byId("looks")?.value);
   showPose(T.at(-1));
   showMeasures(data, T, names.filter((_, k) => rows[k].dataset.state === "at").map((joint) => fill(words.joint_at_limit, { joint })));
   if (!listed) findSolutions(T.at(-1), now);

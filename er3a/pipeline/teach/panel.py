@@ -198,6 +198,7 @@ WORDS: dict[str, Any] = {
         "overlap": N_("Collision of assumed shapes: {pair} overlap by {distance}."),
         "overlap_deep": N_("Collision of assumed shapes: {pair} overlap by {distance} or more."),
     },
+    "collides": N_("collision: {pair}"),
     "nothing_meets": N_("No bodies here can collide."),
 }
 
@@ -280,7 +281,7 @@ def write_panel(
     opened = rows[(Bodies(robot, scene).free(rows, NEAR_TOUCH) & ~near.contains(robot, rows)).argmax()]
     solids = drawn_scene(scene.solids if scene else (), robot)
     panel = own | {
-        "programs": own["programs"] and not (first_caveat and first_caveat.status == "fail"),
+        "wrong": first_caveat is not None and first_caveat.status == "fail",
         "scene": solids,
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "floor": floor_of(scene),

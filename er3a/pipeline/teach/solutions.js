@@ -76,10 +76,9 @@ export class SolutionList {
     const overlap = this.overlap(first.q); // whole turns change nothing
     for (const row of turns) row.overlap = overlap;
     const joints = element("span", "row-joints", "", first.q.map((value, k) => element("span", "", fixed(shown(this.data.table, k, value)))));
-    const state = !first.withinLimits ? "fail" : this.#atLimit(first).length ? "near" : "pass";
-    const verdict = element("span", `row-verdict ${state}`, this.#verdict(first));
-    const collision = overlap ? [element("span", "row-verdict fail", overlap)] : [];
-    const button = this.#button(first, [element("b", "", this.#label(first)), joints, verdict, ...collision]);
+    const state = !first.withinLimits || overlap ? "fail" : this.#atLimit(first).length ? "near" : "pass";
+    const verdict = element("span", `row-verdict ${state}`, (first.withinLimits && overlap) || this.#verdict(first));
+    const button = this.#button(first, [element("b", "", this.#label(first)), joints, verdict]);
     const item = element("li", "branch", "", [button]);
     if (further.length) {
       const chips = further.map((row) => {

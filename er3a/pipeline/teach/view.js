@@ -24,10 +24,10 @@ export class ArmView extends Space {
     const { data, base, reach } = this;
     const poses = this.#poses(q);
     const touching = new Set(nearest?.touching ?? []);
-    const colours = new Map([...touching].map((name) => [name, data.colours.touching]));
+    const colours = new Map((data.wrong ? poses.map((_, j) => (j ? `link_${j}` : "base")) : [...touching]).map((name) => [name, data.colours.touching]));
     this.begin();
     this.floor(base, reach / 10, data.floor ?? base[2]);
-    this.arm.show(poses, colours, look);
+    this.arm.show(poses, colours, look, data.wrong);
     if (ghost) this.other.show(this.#poses(ghost), new Map(), look, true);
     else this.other.hide();
     const hiding = this.hiding(this.surroundings, poses);

@@ -323,137 +323,55 @@ function filterFor(table) {
   return box;
 }
 
-const HEADINGS = ["H2", "H3", "SUMMARY", "CAPTION"];
-const CONTAINERS = "h2, h3, p, ul, ol, dl, tr, figure, section, details";
-const WHOLE = "tr, li, dl, figure, .answer, #turning, .player"; // found or not as one
-const BESIDE = "script, style, thead, .tools, .pickers"; // goes with what it belongs to
-const WARNING = ".answer, .before, p:has(strong)";
-
-// What a reader sees of an element, folded or not, in small letters.
-function allText(element) {
-  if (element.nodeType === Node.TEXT_NODE) return element.data;
-  if (["SCRIPT", "STYLE", "CANVAS", "WBR"].includes(element.tagName)) return "";
-  return `${element.alt ?? ""} ${[...element.childNodes].map(allText).join("")} `;
-}
-
 // Whether a text holds a word, from the word's beginning on.
 const holdsWord = (text, word) => new RegExp(`(?<![a-z\\d])${word.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")}`).test(text);
 
 // As it is compared: in small letters, with plain minus signs and numbers.
 const sought = (text) => text.toLowerCase().replaceAll("−", "-").replaceAll("\u202f", "");
 
-// Leaves of an element what holds all words, counting those of the headings above it; how many places stay.
-function keepFound(element, words, above) {
-  let count = 0;
-  const heads = []; // headings above a child: rank, element, text
-  if (element.matches(BESIDE)) return 0;
-  if (element.matches(WHOLE) || !element.querySelector(CONTAINERS)) {
-    const text = above + sought(allText(element));
-    count = Number(words.every((word) => holdsWord(text, word)));
-  } else {
-    for (const child of element.children) {
-      const rank = HEADINGS.indexOf(child.tagName);
-      if (rank >= 0) {
-        while (heads.length && heads.at(-1).rank >= rank && rank < 2) heads.pop();
-        heads.push({ rank, child, text: sought(allText(child)) });
-        child.classList.add("unfound");
-        continue;
-      }
-      const found = keepFound(child, words, above + heads.map(({ text }) => text).join(" "));
-      if (found) heads.forEach((head) => head.child.classList.remove("unfound"));
-      count += found;
-    }
-  }
-  element.classList.toggle("unfound", count === 0);
-  if (count && element.tagName === "DETAILS") element.open = true;
-  return count;
+const SHOWN_PLACES = 4;
+const SHOWN_LETTERS = 160;
+const BEGINNING = 60; // letters by which an address names a place
+const PLACES = "h1, h2, h3, summary, caption, figcaption, p, li, dt, dd, tr, img, div";
+let places = null; // of all pages, this one first: its address, its title, texts with what they are sought in
+
+async function loadPlaces(root) {
+  const pages = await (await unpacked(globalThis.PLACES)).json();
+  places = pages.map(([page, title, parts]) => {
+    const texts = parts.flatMap(([head, own]) => own.map((text) => ({ text, letters: sought(text), above: sought(`${title} ${head}`) })));
+    return { address: new URL(page, root).href, title, whole: sought(title), texts };
+  });
+  places.sort((a, b) => location.href.startsWith(b.address) - location.href.startsWith(a.address));
 }
 
-// What warns of a part of which something is found stays with it.
-function keepWarnings(main) {
-  for (const warning of main.querySelectorAll(WARNING)) {
-    const about = warning.parentElement.closest("section, details, main");
-    if (about.closest(".unfound")) continue;
-    for (let part = warning; part !== about; part = part.parentElement) part.classList.remove("unfound");
-  }
-}
-
-// One field over the whole page; the address keeps its words, as "?find=words". The index looks on all pages with it.
+// A menu with a field for words and the places that have them, on all pages; the page beneath stays as it is.
 function addFinder() {
-  const main = document.querySelector("main");
-  const box = Object.assign(document.createElement("p"), { className: "find", role: "search" });
-  const field = document.createElement("input");
-  const status = Object.assign(document.createElement("span"), { role: "status" });
-  const elsewhere = document.createElement("ul");
-  field.type = "search";
-  field.placeholder = field.ariaLabel = document.getElementById("places") ? WORDS.findAnywhere : WORDS.find;
-  field.value = new URLSearchParams(location.search).get("find") ?? "";
-  elsewhere.className = elsewhere.id = "elsewhere";
-  box.append(field, " ", status);
+  if (!globalThis.PLACES) return;
+  const menu = Object.assign(document.createElement("details"), { className: "menu find" });
+  menu.innerHTML = '<summary></summary><div role="search"><input type="search"> <span role="status"></span><ul></ul></div>';
+  const [label, field, status, list] = ["summary", "input", "span", "ul"].map((part) => menu.querySelector(part));
+  [label.textContent, field.ariaLabel] = [WORDS.find, WORDS.find];
   const header = document.querySelector("header");
-  header.insertBefore(box, header.querySelector(".chip"));
-  main.after(elsewhere); // what this page has itself comes first
-  let open = null; // what was unfolded before
-  const find = () => {
+  header.insertBefore(menu, header.querySelector(".chip"));
+  menu.addEventListener("toggle", () => menu.open && field.focus());
+  field.addEventListener("input", async () => {
+    if (!places) await loadPlaces(document.querySelector('script[src$="marks.js"]').src);
     const words = sought(field.value).split(/\s+/).filter(Boolean);
-    main.classList.toggle("finding", words.length > 0);
-    open ??= new Map([...main.querySelectorAll("details")].map((part) => [part, part.open]));
-    const others = words.length ? placesElsewhere(words) : [];
-    elsewhere.replaceChildren(...others.map((each) => linkTo(each, words)));
-    const here = words.length ? keepFound(main, words, "") : 0;
-    const away = others.reduce((sum, { texts }) => sum + texts.length, 0);
-    const count = here + away;
-    status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : WORDS.none;
-    if (count) keepWarnings(main);
-    if (!words.length || !count) { // all of the page
-      for (const part of [main, ...main.querySelectorAll(".unfound")]) part.classList.remove("unfound", "finding");
-      open.forEach((was, part) => (part.open = was));
-    }
-    if (!words.length) open = null;
-    dispatchEvent(new Event("resize")); // for what takes its size from what was not there
-  };
-  const findAnywhere = () => (places ? find() : loadPlaces().then(find));
-  field.addEventListener("input", () => {
-    findAnywhere();
-    keepInAddress({ find: field.value, at: "" });
+    const found = words.length ? placesWith(words) : [];
+    list.replaceChildren(...found.map((each) => linkTo(each, words)));
+    status.textContent = words.length && !found.length ? WORDS.none : "";
   });
   addEventListener("keydown", (event) => {
     const busy = event.target.closest?.("input, select, textarea, canvas, [contenteditable]");
     if (event.key !== "/" || busy || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    field.focus();
-  });
-  addEventListener("hashchange", () => {
-    if (!document.getElementById(addressed())?.closest(".unfound")) return;
-    field.value = "";
-    field.dispatchEvent(new Event("input"));
-    document.getElementById(addressed()).scrollIntoView();
-  });
-  if (!field.value) return;
-  findAnywhere();
-  goToPlace(main, () => {
-    field.value = "";
-    find();
+    menu.open = true;
   });
 }
 
-const SHOWN_PLACES = 4;
-const SHOWN_LETTERS = 160;
-const BEGINNING = 60; // letters by which an address names a place
-const PLACES = "h2, h3, summary, caption, figcaption, p, li, dt, dd, tr, img, div";
-let places = document.getElementById("places") ? null : []; // of all pages, by page: its address, its title, texts with what they are sought in
-
-async function loadPlaces() {
-  const pages = await (await unpacked(document.getElementById("places").textContent)).json();
-  places = pages.map(([address, title, parts]) => {
-    const texts = parts.flatMap(([head, own]) => own.map((text) => ({ text, letters: sought(text), above: sought(`${title} ${head}`) })));
-    return { address, title, whole: sought(title), texts };
-  });
-}
-
-// What other pages have that holds all words, at least one of them itself and the others in a heading above it, by page.
+// What pages have that holds all words, at least one of them itself and the others in a heading above it, by page.
 // Words that a page's title has lead to the page.
-function placesElsewhere(words) {
+function placesWith(words) {
   const holds = ({ letters, above }) => words.every((word) => holdsWord(`${above} ${letters}`, word)) && words.some((word) => holdsWord(letters, word));
   const found = places.map(({ address, title, whole, texts }) => {
     const held = texts.filter(holds).map(({ text }) => text);
@@ -471,31 +389,27 @@ function excerpt(text, words) {
 
 const squeezed = (text) => text.replace(/\s+/g, "");
 
-// Links to a page, which looks for the words there, and to the first places that have them.
+// Links to a page and to the first places that have the words.
 function linkTo({ address, title, texts }, words) {
   const item = document.createElement("li");
-  const link = (text, place) => {
-    const asked = new URLSearchParams({ find: words.join(" "), ...(place && { at: squeezed(place).slice(0, BEGINNING) }) });
-    return Object.assign(document.createElement("a"), { href: `${address}?${asked}`, textContent: text });
-  };
+  const link = (text, place) => Object.assign(document.createElement("a"), { href: `${address}${place ? `?at=${encodeURIComponent(squeezed(place).slice(0, BEGINNING))}` : ""}`, textContent: text });
   const shown = texts.slice(0, SHOWN_PLACES).flatMap((text) => [" · ", link(excerpt(text, words), text)]).slice(1);
   item.append(link(title), WORDS.colon, ...shown, texts.length > SHOWN_PLACES ? ` … (${texts.length})` : "");
   return item;
 }
 
-// Where the text begins that the address names; of parts that are shown one at a time that one is then shown, whole.
-function goToPlace(main, showAll) {
+// Where the text begins that the address names; of parts that are shown one at a time that one is then shown.
+function goToPlace() {
   const beginning = new URLSearchParams(location.search).get("at");
-  const begins = (part) => squeezed(allText(part)).startsWith(beginning);
-  const place = beginning && [...main.querySelectorAll(PLACES)].find((part) => part.checkVisibility() && begins(part));
+  const all = beginning ? [...document.querySelectorAll(`main :is(${PLACES})`)].filter((part) => squeezed(part.textContent).startsWith(beginning)) : [];
+  const place = all.find((part) => part.checkVisibility()) ?? all[0];
   if (!place) return;
   const part = place.closest("[data-one-of] > *");
   if (part) {
-    showAll();
     part.dispatchEvent(new Event("beforematch"));
     keepInAddress({}, part.querySelector("h2").id); // the player takes it up
-    unfold(place);
   }
+  unfold(place);
   place.classList.add("sought");
   place.scrollIntoView({ block: "center" });
 }
@@ -733,12 +647,14 @@ mark(playing(asked.get("play"), asked.get("t")) ?? rows.find((row) => row.queryS
 const follow = ({ detail }) => rows.some((row) => row.ariaCurrent && row.dataset.play === detail) || choose(playing(detail), detail);
 addEventListener("player", () => addEventListener("motion", follow)); // the first one is not of the reader's choice
 
+addFinder();
+
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");
 addEventListener("click", ({ target }) => menus.forEach((menu) => menu.contains(target) || (menu.open = false)));
 addEventListener("keydown", ({ key }) => key === "Escape" && menus.forEach((menu) => (menu.open = false)));
 
-addFinder();
+goToPlace();
 addEventListener("click", keepPlace, true);
 addEventListener("player", returnToPlace);
 returnToPlace();

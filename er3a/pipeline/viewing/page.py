@@ -83,8 +83,6 @@ SCRIPT_WORDS = {
     "close": N_("close"),
     "filter": N_("Filter rows by"),
     "find": N_("Find"),
-    "findAnywhere": N_("Find on all pages"),
-    "found": N_("{count} places"),
     "none": N_("Nothing has all these words: try fewer, or others"),
     "colon": N_(": "),
     "bounds": N_("at least|at most|up to|about"),  # words before a number by which cells are sorted all the same

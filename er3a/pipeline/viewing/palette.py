@@ -21,7 +21,6 @@ MODEL = "#0072b2"
 REFERENCE = "#d55e00"
 HIGHLIGHT = "#c2185b"
 LINK = "#c9d1d9"
-SOLUTIONS = ("#6b7785",) * 8  # drawn at a time, as colours are those of joints
 SHELL = "#eef2f6"
 BODY = "#9aa5b1"
 PLATE = "#4a5868"

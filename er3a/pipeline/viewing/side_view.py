@@ -141,15 +141,15 @@ def dimension(far: float, low: float, high: float, kind: LabelKind) -> list[Draw
 
 
 def beyond(arms: Sequence[SeenArm]) -> float:
-    """How far forward (mm) there is room for words: beyond the arms and what the first reaches, so that no outline of
+    """How far forward (mm) there is room for words: beyond the arms and what they reach, so that no outline of
     these crosses a word."""
     corners = _corners(arms)
     return float(corners[:, 0].max() + COLUMN * np.ptp(corners, axis=0).max())
 
 
 def _corners(arms: Sequence[SeenArm]) -> Reals:
-    """All arms' points and what the first reaches (k, 2), mm: what further ones reach may go beyond the drawing."""
-    return np.concatenate([*(arm.points_mm for arm in arms), *arms[0].reach_mm])
+    """All arms' points and what they reach (k, 2), mm."""
+    return np.concatenate([each for arm in arms for each in (arm.points_mm, *arm.reach_mm)])
 
 
 def side_view(
@@ -276,7 +276,9 @@ def _line(points: Reals) -> str:
 def _reach(arm: SeenArm) -> Markup:
     """What is reached, in one path, so that rings within rings let the colour of holes through."""
     rings = [_line(ring) for ring in arm.reach_mm]
-    holes = Markup("").join(Markup('<polygon class="hole {}" points="{}"/>').format(arm.kind, ring) for ring in rings)
+    inner = sorted(arm.reach_mm, key=lambda ring: ring[:, 0].max())[:-1]
+    hole = Markup('<polygon class="hole {}" points="{}"/>')
+    holes = Markup("").join(hole.format(arm.kind, _line(ring)) for ring in inner)
     outline = " ".join(f"M{ring}Z" for ring in rings)
     return holes + Markup('<path class="reach {}" fill-rule="evenodd" d="{}"/>').format(arm.kind, outline)
 

@@ -35,7 +35,6 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 MOMENT = 1e-6  # s
-SHORTLY = 2e-3  # s, before a fault: the player takes less for its moment
 WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "caution", "fail": "fail"}
 
 
@@ -70,12 +69,6 @@ def _line_text(line: int, clear_mm: Reals) -> str:
     """A line while it is carried out, and how clear the arm then is, where that was measured."""
     clear = [tr("{far} mm clear", far=fixed(far, 0)) for far in clear_mm[clear_mm >= 0]]
     return joined([tr("line {line}", line=line), *clear[:1]], ", ")
-
-
-def _safe_s(program: ProgramSummary) -> float:
-    """The last moment (s) before anything is wrong with a program; below 0 where there is none."""
-    wrong = [each.program_s or 0.0 for each in program.findings if WEIGHTS[each.level] != "plain"]
-    return min(wrong, default=0.0) - SHORTLY
 
 
 def _end_s(found: FindingAt) -> float | None:
@@ -188,7 +181,6 @@ def faults(results: ProgramsResults) -> list[Fault]:
         shown = [worst] if worst.level == first.level else [worst, first]
         moments = tuple(_moment(program, each, lines) for each in shown)
         end = _end_s(worst)
-        safe = _safe_s(program) if end is None else end
         collides = is_one(worst.finding, "motion_collides")
         found.append(
             Fault(
@@ -199,7 +191,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 moments,
                 joined(dict.fromkeys(_to_do(program, each) for each in shown), " "),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
-                (_seconds(safe), address_of("programs", program.name, 0.0, program.name, safe)) if safe > 0 else None,
+                (_seconds(end), address_of("programs", program.name, 0.0, program.name, end)) if end else None,
                 cause,
             )
         )

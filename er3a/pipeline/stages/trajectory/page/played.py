@@ -8,10 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import names_of
+from er3a.collision.scene import Scene
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, tr
+from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
@@ -42,17 +44,24 @@ from er3a.robots.robot import Robot
 SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
 LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
 MIN_LENGTH = 1e-6  # m
+MOMENT = 0.001  # s
 DASHES = 3  # of the rest of a path that the arm does not reach
 SINGULAR_AXES = {"wrist": (4, 6), "elbow": (2, 3), "shoulder": (1,)}  # rows of the table that such a pose is of
 RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
 
 
 def motions(
-    robot: Robot, results: model.TrajectoryResults, more: Mapping[str, PlayedEvent] | None = None
+    robot: Robot,
+    results: model.TrajectoryResults,
+    more: Mapping[str, PlayedEvent] | None = None,
+    scene: Scene | None = None,
 ) -> list[PlayedMotion]:
     """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it.
 
-    ``more``: an event of motions, by their names.
+    Parameters
+    ----------
+    more : an event of motions, by their names
+    scene : to which narrow gaps are drawn
     """
 
     def added(name: str) -> list[PlayedEvent]:
@@ -69,6 +78,8 @@ def motions(
             seen += _nearest(path.clearance)
         seen += safe_end(path, results.clearance)
         marks, q = [*contact(path), *_beyond(path, whole)], meant(robot, rows.q_deg)
+        if near and path.clearance and scene:
+            marks.append(_gap(Bodies(robot, scene), path.clearance, rows.t_s, q))
         motions.append(PlayedMotion(path.name, text, rows.t_s, q, seen, marks, whole_s=path.duration_s))
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
@@ -77,6 +88,14 @@ def motions(
             seen = [*added(repaired(path)), *_nearest(path.chosen.motion.clearance if path.chosen.motion else None)]
             motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, seen))
     return motions
+
+
+def _gap(bodies: Bodies, least: model.MinClearance, t: Reals, q: Reals) -> Mark:
+    """Where a motion, joint values ``q`` (N, n) at times ``t`` (N,), is nearest to anything, as a line there."""
+    then = np.array([[np.interp(least.t_s, t, own) for own in q.T]])
+    start, end = bodies.surface_points(then[0], int(bodies.min_distance(then)[1][0])).tolist()
+    far = with_unit(fixed(least.least_mm, 1), "mm")
+    return Mark(least.t_s - MOMENT, least.t_s + MOMENT, start, end, far)
 
 
 def _nearest(least: model.MinClearance | None) -> list[PlayedEvent]:

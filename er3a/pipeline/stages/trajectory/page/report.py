@@ -66,7 +66,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     met = None if contradicted else met_in_tray(study, stored)
     wrong = {} if contradicted else _by_name(results)
     trays = {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in (met or {}).items()}
-    played, names = motions(robot, results, trays), [path.name for path in paths]
+    played, names = motions(robot, results, trays, scene), [path.name for path in paths]
     for i, path in enumerate(() if contradicted else paths):
         rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count))
@@ -255,7 +255,7 @@ def both_arms(
         off = shift_between(*ends)
         k = np.argmax(off)
         far = with_unit(fixed(1000 * off[k], 0), "mm")
-        seen.append(replace(motion, beside=(motion.q,), ghosts=()))
+        seen.append(replace(motion, beside=(motion.q,)))
         rows.append((off[k], far, (motion.name, motion.t[k])))
     rows.sort(reverse=True)
     whole, most, opened = rows[0]

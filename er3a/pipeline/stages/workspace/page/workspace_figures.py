@@ -25,6 +25,7 @@ from er3a.pipeline.viewing.side_view import (
     Kind,
     Label,
     SeenArm,
+    beyond,
     border_lines,
     dimension,
     side_view,
@@ -175,17 +176,25 @@ def labelled(
         points = skeleton(robot, np.zeros(robot.joints)) - summary.axis.point_m
         arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
         lines = border_lines(border.arc, border.rho_m, border.z_m)
-        seen.append(SeenArm(own_title(robot.title), reaches(summary) if arms[1:] else "", kind, arm, lines))
+        seen.append(SeenArm(own_title(robot.title), "", kind, arm, lines))
         labels += void_labels(summary, kind)
-        if arms[1:]:  # what the wrong one reaches would make both arms small
-            continue
         outer = np.concatenate(lines)
         far, height = outer[outer[:, 0].argmax()]
+        if arms[1:]:  # words at the side say how far
+            labels.append(Label(reaches(summary), np.array([far, height]), kind))
+            continue
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([far / 2, below - BELOW * far]), kind, "reach"))
         over += [*dimension(far, below, height, kind), DrawnLine(outer, "mark")]  # which no row shows: it is within
     labels += through_floor(seen, floor_mm)
-    return side_view(seen, floor_mm, ratio=WIDE if arms[1:] else 1.2, labels=labels, over=over)
+    return side_view(
+        seen,
+        floor_mm,
+        ratio=WIDE if arms[1:] else 1.2,
+        labels=labels,
+        column_mm=beyond(seen) if arms[1:] else None,
+        over=over,
+    )
 
 
 def litres(void: model.VoidSummary) -> str:
@@ -228,8 +237,8 @@ def void_labels(summary: model.WorkspaceSummary, kind: Kind = "right") -> list[L
             continue
         if kind == "right":
             said = if_normal(void, void_name(number_, void))
-            labels.append(Label(said, at, "hole", f"hole-{number_}", start, written_there=True))
+            labels.append(Label(said, at, "hole", f"hole-{number_}", start))
         elif not void.holds_shoulder:
             within = 1000 * np.array([INSIDE * low, (void.centroid_m[2] + void.high_m[2]) / 2])
-            labels.append(Label(tr("wrong table's void, {size}", size=about(void)), within, kind, written_there=True))
+            labels.append(Label(tr("wrong table's void, {size}", size=about(void)), within, kind))
     return labels
