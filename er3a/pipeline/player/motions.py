@@ -13,6 +13,7 @@ from er3a.by_value import by_identity, frozen
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import first_sentence
 from er3a.pipeline.viewing.answer import Fix, ListRow, Part
+from er3a.pipeline.viewing.still import ELEVATION
 from er3a.robots.robot import Robot
 
 Weight = Literal["plain", "caution", "fail"]
@@ -100,6 +101,7 @@ class PlayedMotion:
     beside : (N, n) each, joint coordinates of the arms that stand beside the first
     ghosts : (n,) each, joint coordinates of poses in which the first arm is drawn pale all the while
     loads : (N, n), what each joint bears, N m, or N where it slides: a bar at each; None where nothing is known
+    elevation : rad, of the eye: 0 for a side elevation
     """
 
     name: str
@@ -112,6 +114,7 @@ class PlayedMotion:
     ghosts: Sequence[Reals] = ()
     loads: Reals | None = None
     whole_s: float = 0.0
+    elevation: float = ELEVATION
 
 
 def at_rest(

@@ -113,7 +113,7 @@ function draw() {
   const poses = arms.map((arm, k) => posesOf(arm, valuesAt(motion.times, motion.values[k], t)));
   const { page } = space;
   if (space.target !== motion.target) Object.assign(space, { target: motion.target, distance: (space.distance * motion.length) / space.length, length: motion.length });
-  if (space.turned !== motion.turned) Object.assign(space, { azimuth: space.azimuth + motion.turned - (space.turned ?? 0), turned: motion.turned });
+  if (space.turned !== motion.turned) Object.assign(space, { azimuth: space.azimuth + motion.turned - (space.turned ?? 0), elevation: motion.elevation, turned: motion.turned });
   space.begin();
   space.floor(column(table.base, 3), data.size / 10, floor, Boolean(unjudged));
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));

@@ -23,7 +23,6 @@ from er3a.pipeline.viewing.palette import BODY, DOUBTFUL, INK, TOUCHING
 from er3a.pipeline.viewing.still import (
     AZIMUTH,
     DISTANCE,
-    ELEVATION,
     FIELD,
     WIDE,
     Still,
@@ -45,7 +44,7 @@ TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from wh
 HIDDEN_COSTS, TURN_COSTS = 1.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
 WAY_COUNTS = 1.0  # in a view, to the arm
 GRAVEST: tuple[Weight, ...] = ("fail", "caution", "plain")  # the last such moment is seen from the side
-VIEW = ("turned", "length", "target")
+VIEW = ("turned", "elevation", "length", "target")
 FRAMED = 9  # moments of a motion that the picture holds
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
@@ -96,7 +95,7 @@ def player(
         if motion.events and not beside:  # what nothing is said of is the one before it in another way, and seen alike
             gravest = min(reversed(motion.events), key=lambda event: GRAVEST.index(event.status))
             turned = best_turn(robot, motion, data["opened"][1] if motion is first else gravest.t, data)
-        own |= _frame(data, robots, motion, turned) | {"turned": turned}
+        own |= _frame(data, robots, motion, turned) | {"turned": turned, "elevation": motion.elevation}
     data |= {key: own[key] for own in data["motions"] if own["name"] == first.name for key in VIEW}
     return Markup(
         page_environment(_HERE)
@@ -188,7 +187,7 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, 
     points += [np.array([mark.start]) for mark in motion.marks]
     middle, far = robots[0].base[:3, 3], FARTHEST * data["size"] + np.ptp([each.base[:3, 3] for each in robots], axis=0)
     seen = np.clip(np.concatenate(points), middle - far, middle + far)
-    axes = axes_of(AZIMUTH + turned, ELEVATION)
+    axes = axes_of(AZIMUTH + turned, motion.elevation)
     across = seen @ axes.T
     middle = (across.min(axis=0) + across.max(axis=0)) / 2
     across -= middle
@@ -214,7 +213,7 @@ def best_turn(robot: Robot, motion: PlayedMotion, t: float, data: dict[str, Any]
     whole = np.linalg.norm(np.diff(joints, axis=1), axis=2).sum()
     best = []
     for turn in TURNS:
-        axes = axes_of(AZIMUTH + turn, ELEVATION).T
+        axes = axes_of(AZIMUTH + turn, motion.elevation).T
         seen = points @ axes
         long = np.linalg.norm(np.diff((joints @ axes)[..., :2], axis=1), axis=2).sum() / whole
         long += WAY_COUNTS * np.linalg.norm(np.ptp((way @ axes)[:, :2], axis=0)) / data["size"]

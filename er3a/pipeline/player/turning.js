@@ -9,7 +9,7 @@ import three from "er3a/three";
 
 const STEPS = 65535; // that the box is divided into
 const FLOOR = 14; // lines of the floor, along what is seen
-const NEAR = 0.8; // of the distance that all is seen from: where a tray is
+const NEAR = 0.95; // of the distance that all is seen from: where a tray is
 const SPARSE = 20; // one of so many points of a void keeps words off it
 const AWAY = 0.3; // of its opacity what is reachable keeps before a tray
 const THROUGH = { transparent: true, depthWrite: false, side: three.DoubleSide };
@@ -107,7 +107,6 @@ function draw() {
   for (const each of solids.filter(isSeen)) {
     const hiding = each === solids[0] || each === shown ? new Set() : space.hiding(each.parts, arm);
     space.place(each.parts, each === solids[0] ? arm : each.poses, new Map(), (part) => hiding.has(part));
-    for (const part of hiding) part.visible = Boolean(near || each.address); // before the arm at 0 it would look like contact
   }
   const named = all.filter((each) => each.address && isSeen(each));
   space.keepClear(alongArm(arm), ARM * size[0]);
@@ -118,7 +117,7 @@ function draw() {
     space.word(text, add(scaled(from, 0.4), scaled(to, 0.6)), space.page.accent, Boolean(shown) || !space.small);
   }
   for (const each of named) space.word(each.name, each.points?.reduce((a, b) => (dot(eyeOf(space).back, subtract(b, a)) > 0 ? b : a)) ?? placeOf(each), each === shown ? space.page.accent : space.page[each.points ? "hole" : "ink"], each === shown || !space.small); // the list has them all
-  for (const each of solids.slice(1).filter((each) => !each.address && isSeen(each))) space.names(each.parts.filter(({ visible }) => visible));
+  for (const each of solids.slice(1).filter((each) => !each.address && isSeen(each))) space.names(each.parts);
   space.end();
   place.toggleAttribute("data-drawn", true);
 }

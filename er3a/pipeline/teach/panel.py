@@ -58,7 +58,7 @@ WORDS: dict[str, Any] = {
     "views": {"overview": N_("Overview"), "side": N_("Side"), "front": N_("Front"), "top": N_("Top")},
     "looks": N_("Arm drawn as"),
     "look": LOOKS,
-    "frames": N_("Frames of the table"),
+    "frames": N_("D-H frames"),
     "row": {
         "standard": N_(
             "Row {row}: turn by θ = {theta} about z, go {d} mm along z and {a} mm along the new x, turn by α = {alpha} "

@@ -9,7 +9,7 @@ from er3a.by_value import frozen
 from er3a.pipeline.language import tr
 
 Mark = Literal["pass", "caution", "fail", "conflict", "no_reference", "no_verdict", "none"]
-PartMark = Literal["pass", "caution", "fail", "none", "rest", "zero"]
+PartMark = Literal["pass", "caution", "fail", "none", "rest", "zero", "spread"]
 """Of a stretch of a bar; ``rest`` is what the bar leaves empty, ``zero`` a line at its start."""
 NARROWEST = 0.04  # of a bar, at which a moment is still seen
 

@@ -27,7 +27,7 @@ from er3a.robots.joint_limits import size_of, theta_limits
 from er3a.robots.robot import Robot
 
 MAX_FACES, MIN_CORNERS = 2000, 12  # of an arm, and of a convex piece
-SCENE_COLOUR = "#c3a97e"
+SCENE_COLOUR = "#b3ada4"
 LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be drawn as the floor
 SHORTEST_AXIS = 0.06  # half of a joint's axis, in parts of the arm's size: it is to be seen beyond a housing
 ROD, SHORTEST = 0.016, 1e-6  # radius of a link that has no shape, in parts of the arm's size; m

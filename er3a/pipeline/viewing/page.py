@@ -68,7 +68,7 @@ FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's hea
     "pass": N_("D-H table confirmed"),
     "fail": N_("D-H table contradicted"),
     "caution": N_("D-H table partly settled"),
-    "unsettled": N_("D-H table not settled"),
+    "unsettled": N_("D-H values not settled"),
     "no_reference": N_("D-H table unchecked"),
     "not_computed": N_("D-H table unchecked"),
 }

@@ -179,7 +179,8 @@ def scene_still(
     """
     base = np.array(data["table"]["base"])[:3, 3]
     floor = base[2] if data["floor"] is None else data["floor"]
-    picture = Still(data["target"], data["length"], AZIMUTH + turned, floor=floor)
+    elevation = data.get("elevation", ELEVATION)
+    picture = Still(data["target"], data["length"], AZIMUTH + turned, elevation, floor=floor)
     picture.grid(base, data["size"] / 10)
     picture.solids(data["scene"], np.eye(4)[None], colours)
     for arm, T in zip((data, *data.get("others", ())), poses):

@@ -82,6 +82,7 @@ def _answer(
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
     ends = [0.0, *(each.clearance_mm for each in closest)]
     span = min(ends), max(ends)
+    scale = tr("bars {low} to {high} mm", low=fixed(span[0], 0), high=fixed(span[1], 0))
     rows = [_row(each, unreached, near, known.get(each.name), span) for each in closest]
     hit, clear, partly = (
         [row for row in rows if row.mark in marks]
@@ -111,7 +112,7 @@ def _answer(
         all_caught(caught),
         joined([tr(text, count=count) for text, count in counted if count], " "),
         keys,
-        [Group(title, own[:MAX_ROWS]) for title, own in titled],
+        [Group(f"{title}; {scale}" if own is (hit or clear) else title, own[:MAX_ROWS]) for title, own in titled],
         next((row.fix for row in hit if row.fix), None),
     )
 

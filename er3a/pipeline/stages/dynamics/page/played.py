@@ -19,6 +19,7 @@ from er3a.robots.robot import Robot
 MM = 1000.0
 LEVEL = 0.01  # sine of an axis' slope, up to which it counts as level
 DROP_M, HEAD_M = 0.2, 0.03  # length of an arrow drawn for a weight, and of its head
+ABOVE_M = 0.14  # of the arm: there its level distance has room
 FELT = 0.01  # of the greatest peak: what is less is no event
 
 
@@ -48,6 +49,7 @@ def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
             q=meant(robot, np.array(each.q)),
             loads=np.where(np.arange(robot.joints) == each.joint - 1, abs(each.torque), np.tile(np.nan, (2, 1))),
             marks=_weight(robot, results.summary.masses, each),
+            elevation=0.0,
         )
         for each in results.summary.holding
     ]
@@ -81,11 +83,13 @@ def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> lis
     if not links:
         return []
     lever = kg @ off / kg.sum()
-    end = tuple(at + lever)
+    end, over = tuple(at + lever), np.array([0.0, 0.0, ABOVE_M])
     far, heavy = with_unit(fixed(MM * float(np.linalg.norm(lever)), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
     tip, aside = at + lever - [0, 0, DROP_M], HEAD_M * lever / np.linalg.norm(lever)
     head = [Mark(0.0, 1.0, tuple(tip), tuple(tip + way - [0, 0, -HEAD_M]), "") for way in (aside, -aside)]
-    return [Mark(0.0, 1.0, tuple(at), end, far), Mark(0.0, 1.0, end, tuple(tip), heavy), *head]
+    sides = [Mark(0.0, 1.0, tuple(each), tuple(each + over), "") for each in (at, at + lever)]
+    level = Mark(0.0, 1.0, tuple(at + over), tuple(at + lever + over), far)
+    return [level, Mark(0.0, 1.0, end, tuple(tip), heavy), *sides, *head]
 
 
 def within(value: float, tolerance: float, decimals: int = 2) -> str:

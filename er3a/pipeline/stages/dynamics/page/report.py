@@ -19,7 +19,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, holding_text, motions, within
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, PartMark
 from er3a.pipeline.viewing.figures import axis_label, bars, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import JOINTS
@@ -166,13 +166,16 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     if over:
         headline = tr("Too much for {joints}.", joints=joined(over, ", "))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
-    longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
+    most = max(each.holding + held.tolerance for each, held in zip(summary.motors, summary.holding))
+    most = max(most, *(each.peak + _moment_of(results, each)[2] for each in summary.motors)) or 1.0
+    step = 10.0 ** np.floor(np.log10(most))
+    scale = float(step * np.ceil(most / step))  # of all bars without a limit of their own
     rows, still = [], []
     for motor in order:
         path, t, off = _moment_of(results, motor)
-        rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {path}", (path, t), longest, motor.peak_limit))
+        rows.append(_row(motor, (motor.peak, off), f"J{motor.joint}, {path}", (path, t), scale, motor.peak_limit))
         name, held = holding_name(motor.joint), summary.holding[motor.joint - 1]
-        still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), longest))
+        still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), scale))
     left = [
         tr(WITHOUT[each.reason], links=joined(each.names, " + ")) for each in summary.assumed if each.reason in WITHOUT
     ]
@@ -183,10 +186,13 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         tr("± from the masses. Not included: {parts}.", parts=joined(left, ", ")) if left else "",
         [payload],
         [
-            Group(title, [row for row in found if row.length >= SEEN])
+            Group(title, [row for row in found if row.parts[0].end >= SEEN])
             for title, found in (
                 (tr("Greatest torque on the paths"), rows),
-                (tr("Holding, in the worst pose found"), still),
+                (
+                    tr("Holding, in the worst pose found; bars to {most}", most=with_unit(f"{scale:g}", worst.unit)),
+                    still,
+                ),
             )
         ],
         None if limited else Fix(todo, "#drives", False),
@@ -213,14 +219,15 @@ def _row(
     most: float,
     limit: float | None = None,
 ) -> ListRow:
-    """What a joint needs at a moment with its tolerance, as a bar of its limit, or else of the most that any joint
-    needs."""
-    value, share = within(*need, decimals=1), need[0] / (limit or most or 1.0)
+    """What a joint needs at a moment with its tolerance, as a bar of its limit, or else of the scale of all."""
+    value, (share, spread) = within(*need, decimals=1), np.minimum(1.0, np.array(need) / (limit or most))
     if limit:
         value = tr("{value} of {limit}", value=value, limit=number(limit, 2))
     mark = _mark(motor) if limit else "none"
-    parts = [] if limit else [Part(0.0, 1.0, "none", JOINTS[motor.joint - 1])]
-    return ListRow(mark, name, with_unit(value, motor.unit), f"#{moment[0]}", moment, min(1.0, share), parts)
+    own: PartMark = "fail" if mark == "fail" else "pass"
+    colour = "" if limit else JOINTS[motor.joint - 1]
+    parts = [Part(0.0, share, own, colour), Part(share, 1.0, "rest"), Part(share - spread, share + spread, "spread")]
+    return ListRow(mark, name, with_unit(value, motor.unit), f"#{moment[0]}", moment, 1.0, parts)
 
 
 def _links(summary: model.DynamicsSummary) -> list[list[str]]:

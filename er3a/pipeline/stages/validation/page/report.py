@@ -68,14 +68,14 @@ HEAD = 0.5  # of its radius, the length of its head
 TILT = 0.5  # of a circle around an axis in the drawing's plane, seen a little from above
 RADIUS = 0.045  # of such an arrow, of the size of the arm
 BELOW = 0.15  # of a reach: from one line to the next below the base
-LARGER = 10  # the difference between what documents state, in its drawing
+LARGER, GLASS = 10, 0.8  # the difference between what documents state, in a glass of this radius, of such a step
+ROUND = np.linspace(0.0, 2 * np.pi, 49)
 LABELLED = 5  # of the lengths that are wrong, at most, so that words have room
 AHEAD = 1.12  # of the way to a jogged arm's end: what is said of it
 UP, MARK_MM = [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)], 1000.0  # where a mark on the flange is that is seen to turn
 JOG = np.radians(np.linspace(0.0, 30.0, 13))  # of a joint that one looks at
 VIEWS = {  # from x, y and z to what is to the right and upwards for one who looks from there
-    N_("from above, base toward you"): [(0, 1), (-1, 0), (0, 0)],
-    N_("from behind"): [(0, 0), (-1, 0), (0, 1)],
+    N_("from behind"): [(0, 0.6), (-1, 0), (0, 0.8)],  # and from a little above
     N_("from the side"): [(1, 0), (0, 0), (0, 1)],
 }
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
@@ -121,17 +121,9 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     instead = alternative_table(study, stored.robot, stored.folder) if summary.verdict.status == "fail" else None
     evidence = evidence_section(summary.evidence)
     disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
-    q, summed = np.zeros(robot.joints), list[str]()
+    q = np.zeros(robot.joints)
     for each in disputed[:1]:
-        reach = AxisDistance(**each.subject.params)
-        found, q = search(robot, reach, REACH_STARTS)
-        without = [
-            (f"{kind}{k}", robot.replace(**{kind: getattr(robot, kind) * row}))
-            for k, row in enumerate(1 - np.eye(robot.rows), 1)
-            for kind in "ad"
-        ]
-        # Without a length that makes it, the reach is another.
-        summed = [entry for entry, arm in without if not np.isclose(1000 * reach.measure(frames(arm, q)), found)]
+        _, q = search(robot, AxisDistance(**each.subject.params), REACH_STARTS)
     render_stage(
         study,
         stored,
@@ -144,7 +136,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
             disputed,
             q,
         ),
-        summed=summed,
         at_side=True,
         plain_table=None if evidence else plain_table(robot),
         robot=robot,
@@ -179,18 +170,26 @@ def _both_arms(
     own = arms[-1]
     labels, over = list[Label](), list[DrawnLine]()
     for each in disputed:
-        step = BELOW * each.measured
+        step, kinds = BELOW * each.measured, dict[float, LabelKind]()
         for row, stated in enumerate(each.statements, 1):
             kind: LabelKind = "right" if stated.met else "open"
+            kinds[stated.expected] = kind
             text = joined([with_unit(fixed(stated.expected, 1), each.unit), own_title(stated.document)], ": ")
             labels.append(Label(text, np.array([0.0, -step * row]), kind, "seen", written_there=True))
             over += dimension(stated.expected, -step * (row + 0.5), own.points_mm[-1, 1], kind)
         ends = np.array([stated.expected for stated in each.statements])[[0, -1]]
-        wide = ends.mean() - 3 * step + LARGER * (ends - ends.mean())
-        corners = np.array([[ends[0], *wide, ends[1]], [2 * step, step, step, 2 * step]])
-        over.append(DrawnLine(corners.T, "dimension open"))
+        seen = np.array([ends.mean(), 1.5 * step])
+        glass = seen - [3 * step, 0]
+        ring = np.column_stack([np.cos(ROUND), np.sin(ROUND)]) * step * GLASS
+        over += [
+            DrawnLine(at, "dimension") for at in (seen + ring / LARGER, glass + ring, np.array([glass + ring[0], seen]))
+        ]
+        for end, way in zip(ends, (1, -1)):
+            line = glass + [[LARGER * (end - seen[0]), up * step / 2] for up in (way, -way)]
+            over.append(DrawnLine(line, "dimension " + kinds[end]))
+            labels.append(Label(fixed(end, 1), line[0] + [-step / 4, way * step / 2], kinds[end], written_there=True))
         text = tr("{far}, {times} times larger", far=with_unit(fixed(np.ptp(ends), 1), each.unit), times=LARGER)
-        labels.append(Label(text, np.array([wide.min(), 0.7 * step]), "open", "seen", written_there=True))
+        labels.append(Label(text, glass - [step, 1.4 * step], "open", "seen", written_there=True))
     cells = {cell["entry"]: cell for _, row in evidence.get("rows", ()) for cell in row if cell}
     lines, right = entry_lines(robot, cells, q), entry_lines(other, cells, q) if off and other else {}
     worst = [row.address for row in evidence.get("first", ())[:LABELLED]]
@@ -198,6 +197,8 @@ def _both_arms(
     for entry, cell in cells.items():
         column, kind, gives = column_of(entry), _kind(cell["status"]), cell["gives"]
         if column == "direction" and kind == "open":
+            if disputed:  # what is asked is a length
+                continue
             turn = _turn_arrow(robot, q, entry, lines[entry][0], radius)
             over.append(replace(turn, points=_headed(turn.points[::-1], radius)) if cell["status"] == "open" else turn)
             continue
@@ -232,7 +233,7 @@ def _look(robot: Robot, found: Finding) -> Markup:
         ways = np.stack([np.zeros_like(tips), MARK_MM * tips], axis=2)
     side = max(VIEWS, key=lambda each: np.linalg.norm((ways[0, -1, -1] - ways[0, 0, -1]) @ VIEWS[each]))
     own = int(robot.direction[found.joint - 1])
-    kinds: dict[Kind, str] = {"right": N_("{value} is right"), "wrong": N_("enter {value}")}
+    kinds: dict[Kind, str] = {"right": N_("this way: keep {value}"), "wrong": N_("this way: enter {value}")}
     arms = [
         SeenArm(tr(kinds[kind], value=fixed(value, 0)), "", kind, way[-1], way=way)
         for kind, way, value in zip(kinds, ways @ VIEWS[side], (own, -own))
@@ -295,7 +296,7 @@ def _answer(
     evidence = summary.evidence
     bad, unsure = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
     headline, rest = _headline(summary, bad, unsure)
-    keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.total else []
+    keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.passed < counts.total else []
     below = ""
     if evidence and bad:
         keys.append((f"{bad}/{known_alone(evidence)}", tr("entries contradicted")))
@@ -318,9 +319,7 @@ def _answer(
     elif disputed:
         stated = joined([fixed(value, 1) for value in values], " or ")
         fix = Fix(
-            tr("measure the {subject}: {values} mm?", subject=say(disputed[0].subject), values=stated),
-            "#seen",
-            instead=False,
+            tr("measure the {subject}: {values} mm?", subject=say(disputed[0].subject), values=stated), instead=False
         )
     elif is_one(found, "validation.left_open") and found.next_measurement:
         fix = Fix(to_settle(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)

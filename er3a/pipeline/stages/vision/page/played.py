@@ -113,6 +113,11 @@ def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[
     frame = 0 if fixed_camera else robot.rows + 1
     common = {"frame": frame, "name": tr("camera"), "T": T.tolist(), "colour": REFERENCE}
     corners = _corners(task, SIGHT * task.view.farthest_mm / 1000)
+    if fixed_camera and summary.objects:  # what it sees of the plane on which objects are
+        down = min(placed(each)[2, 3] for each in summary.objects) - OBJECT_M[2] / 2 - T[2, 3]
+        reached = down / (corners @ T[2, :3])
+        far = task.view.farthest_mm / 1000 / corners[:, 2]
+        corners *= np.where((reached > 0) & (reached < far), reached, far)[:, None]
     points = np.concatenate([np.zeros((1, 3)), corners])
     sight = []
     for i, j in EDGES:

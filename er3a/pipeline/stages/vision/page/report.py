@@ -125,6 +125,8 @@ def _errors(each: model.ObjectResult, limit: float) -> dict[str, Any]:
             parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
             rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
     title = tr("{name}: error, 95 % │ tolerance {limit} mm", name=each.name, limit=f"{limit:g}")
+    if not rows:
+        title, rows = each.name, [ListRow("none", refusal_text(each), "")]
     return {"of": each.name, "title": title, "rows": rows, "counted": False}
 
 
@@ -156,7 +158,6 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         errors=[_errors(each, min(task.gripper.tolerance_mm)) for each in summary.objects],
         found=found,
         file=file,
-        left_out=[f"{each.sample}{tr(': ')}{_why_left_out(each)}" for each in found.suspects] if found else [],
         poses=[*zip(pose_words(found.setup), map(_pose_rows, (found.hand_eye, found.board)))] if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
         touched=_touched(found.touch) if found and found.touch else [],
@@ -188,17 +189,18 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     sure = [(each.grasp.probability, each.error_mm, each.name) for each in grasped if each.grasp and each.error_mm]
     if sure:
         least, error, name = min(sure, key=lambda each: each[0])
-        made = (
-            tr("error at the grasp, 95 %, simulated") if found and found.simulated else tr("error at the grasp, 95 %")
-        )
+        allowed = tr("{limit} allowed", limit=with_unit(f"{limit:g}", "mm"))
+        made = joined([allowed, tr("simulated") if found and found.simulated else ""], ", ")
         keys = [
             (f"{fixed(100 * least, 1)} %", tr("least success: {name}", name=name)),
-            (tr("{value} of {limit}", value=fixed(error.together, 1), limit=with_unit(f"{limit:g}", "mm")), made),
+            (tr("{far} off", far=with_unit(fixed(error.together, 1), "mm")), made),
         ]
     elif found:
         half = fixed(max(found.hand_eye.half_width_mm), 2)
         place = f"{_listed(found.hand_eye.xyz_mm, 0)} ± {half}"
         keys = [(with_unit(place, "mm"), tr("camera's place, 95 %"))]
+    if found and found.suspects and objects:
+        keys.insert(0, (f"{found.used}/{found.samples}", tr("samples used")))
     gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
     fix = Fix(tr("describe the gripper: {file}", file=scene), "#carried", False) if "gripper" in gaps else None
     shown = [_row(each, grasp_moment(results, each), fix) for each in objects]

@@ -53,11 +53,10 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         output,
         answer,
         labelled=_labelled(arms, floor_of(study.scene(instead or stored.robot, "capability")), contradicted),
-        plan=from_above(robot, results, scene, placing.tray, LETTERS) if placing else "",
+        trays=[(row, from_above(robot, results, scene, tray, LETTERS), tray.lines) for row, tray in zip(rows, trays)],
         turning=workspace_figures.in_space(robot, results, scene, trays, [row.mark for row in rows]),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
-        tray_lines=placing.tray.lines if placing and settled else "",
         **capability_context(robot, results, placing, payload),
     )
 

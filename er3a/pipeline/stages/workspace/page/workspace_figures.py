@@ -19,7 +19,7 @@ from er3a.pipeline.player.turning import Layer, Solids, surroundings, turning_fi
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import drawn_scene, floor_of, frame_between, poses_at
-from er3a.pipeline.viewing.palette import VERDICTS, VOIDS
+from er3a.pipeline.viewing.palette import DOUBTFUL, VERDICTS, VOIDS
 from er3a.pipeline.viewing.side_view import (
     DrawnLine,
     Kind,
@@ -100,7 +100,7 @@ def in_space(
         ways = [(middle.tolist(), (middle + border.rho_m[far] * AHEAD).tolist(), reaches(results.summary))]
     solids = surroundings(robot, scene, ways)
     for i, (tray, mark) in enumerate(zip(trays, marks), start=1):
-        colour = VERDICTS[mark]
+        colour = DOUBTFUL if mark == "caution" else VERDICTS[mark]
         drawn, *stand = drawn_scene(tray.parts, robot)
         parts = [drawn | {"colour": colour}, *stand]
         shown = f"tray-{i}", _reaching_in(robot, tray), _ways(tray)
