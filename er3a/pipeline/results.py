@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_type_hints
@@ -384,21 +384,10 @@ def read_foundation(folder: Path) -> Foundation:
     ResultError
         as :func:`read_stage`
     """
-    record = _record(folder)
-    parts = [part["params"] for part in record["verdict"].get("params", {}).get("parts", ())]
-    return foundation_of(record["verdict"]["status"], parts)
-
-
-def foundation_of(status: Status, parts: Sequence[Mapping[str, Any]]) -> Foundation:
-    """What the validation stage's verdict is for those who rest on it: see :func:`read_foundation`.
-
-    Parameters
-    ----------
-    status : of the verdict
-    parts : what documents settle of each part of the table, as the verdict's finding has it
-    """
-    unsettled = bool(parts) and not any(part["settled"] or part["up_to_signs"] for part in parts)
-    return "unsettled" if status == "caution" and unsettled else status
+    verdict = _record(folder)["verdict"]
+    parts = [part["params"] for part in verdict.get("params", {}).get("parts", ())]
+    unsettled = parts and not any(part["settled"] or part["up_to_signs"] for part in parts)
+    return "unsettled" if verdict["status"] == "caution" and unsettled else verdict["status"]
 
 
 def withheld(status: str, foundation: str | None) -> bool:

@@ -42,7 +42,7 @@ from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.drawn import drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
-from er3a.pipeline.viewing.page import FOUNDATION_WORDS, alternative_table, render, robots_with, run_command
+from er3a.pipeline.viewing.page import alternative_table, render, robots_with, run_command
 from er3a.pipeline.viewing.palette import JOINTS, TOUCHING
 from er3a.pipeline.viewing.still import scene_still
 from er3a.programs.writing import ascii_text
@@ -200,6 +200,14 @@ WORDS: dict[str, Any] = {
     },
     "collides": N_("collision: {pair}"),
     "nothing_meets": N_("No bodies here can collide."),
+}
+
+FOUNDATION_WORDS = {  # of validation's foundation, for the mark in the header
+    "fail": N_("D-H table contradicted"),
+    "caution": N_("D-H table partly settled"),
+    "unsettled": N_("D-H values not settled"),
+    "no_reference": N_("D-H table unchecked"),
+    "not_computed": N_("D-H table unchecked"),
 }
 
 

@@ -40,7 +40,6 @@ from er3a.pipeline.results import (
     Provenance,
     Status,
     Stored,
-    foundation_of,
     read_status,
     withheld,
 )
@@ -64,15 +63,6 @@ VERDICT_WORDS = {
 }
 
 PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("Teach panel")}
-FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's header
-    "pass": N_("D-H table confirmed"),
-    "fail": N_("D-H table contradicted"),
-    "caution": N_("D-H table partly settled"),
-    "unsettled": N_("D-H values not settled"),
-    "no_reference": N_("D-H table unchecked"),
-    "not_computed": N_("D-H table unchecked"),
-}
-
 SCRIPT_WORDS = {
     "show": N_("Show it"),
     "playUpTo": N_("Play up to it"),
@@ -226,14 +216,6 @@ class Head:
         if self.table == "unsettled":
             return "caution"
         return "pass as_meant" if self.finding.params.get("demonstrations") else "pass"
-
-    @property
-    def foundation(self) -> str:
-        """What is known of the table that all rests on, in two words."""
-        found = self.table or "pass"
-        if self.stage == "validation":
-            found = foundation_of(self.status, [part.params for part in self.finding.params.get("parts", ())])
-        return tr(FOUNDATION_WORDS[found])
 
     @property
     def finding(self) -> Any:
