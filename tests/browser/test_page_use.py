@@ -208,6 +208,7 @@ def test_a_search_has_a_layer_of_its_own_and_leaves_the_page_as_it_is(browser, s
     )
     shown = "return performance.getEntriesByName('player').length > 0"
     WebDriverWait(browser, PAUSE).until(lambda own: own.execute_script(shown))
+    browser.execute_script("scrollTo(0, 0)")  # browsers keep where a page was before
     before = browser.execute_script(laid)
     assert "er3a_c60/inverse.html" in found_on(browser, "er3a_c60/inverse.html", "solutions")[0].get_attribute("href")
     layer = browser.find_element(By.CSS_SELECTOR, ".find > div").rect
