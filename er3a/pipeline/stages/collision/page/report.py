@@ -112,7 +112,7 @@ def _answer(
         all_caught(caught),
         joined([tr(text, count=count) for text, count in counted if count], " "),
         keys,
-        [Group(f"{title}; {scale}" if own is (hit or clear) else title, own[:MAX_ROWS]) for title, own in titled],
+        [Group(joined([title, scale if own is (hit or clear) else ""]), own[:MAX_ROWS]) for title, own in titled],
         next((row.fix for row in hit if row.fix), None),
     )
 
