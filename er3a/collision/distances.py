@@ -145,17 +145,18 @@ def surfaces_distance(
     distance, overlap : m
     """
     least, close, ends = hulls_distance(trees, a, T, b, S, room, near, far), np.empty((2, 3)), near.copy()
+    none, zero = int(-1), int(0)  # noqa: RUF046, UP018  (see inner_kernel)
     if least > far:
         return least, False
     if least > 0:  # the surfaces' own points nearest to the hulls' nearest ones
         for k, body, frame in ((0, a, T), (1, b, S)):
-            surface_distance(trees, body, frame, -1, frame, (ends, k, k + 1, 0.0), room, close, (1e-99, np.inf))
+            surface_distance(trees, body, frame, none, frame, (ends, k, k + 1, 0.0), room, close, (1e-99, np.inf))
             copy_values(close[0], near[k])
         size = 0.0
         for r in range(3):
             size += (near[1, r] - near[0, r]) ** 2
         far = min(far, np.sqrt(size))
-    core = surface_distance(trees, a, T, b, S, (room, 0, 0, 0.0), room, near, (least, far))
+    core = surface_distance(trees, a, T, b, S, (room, zero, zero, 0.0), room, near, (least, far))
     return core, core == 0.0
 
 
