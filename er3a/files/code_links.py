@@ -194,7 +194,7 @@ def _argument(key: str) -> str:
 
 _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
 _NAMED_BEFORE = re.compile(rf"""["'](?!(?:{_FLAGS.pattern})["'])(\w*)["']\s*,\s*(?=\S)""", re.I)
-"""A name of MATLAB's that stands before its value."""
+"""A name of MATLAB's before its value."""
 
 
 def _of_toolbox(function: str, words: Words, cells: Cells) -> Cells:
