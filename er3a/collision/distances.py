@@ -311,14 +311,8 @@ def measure(layout: Layout, q: Reals, smallest: Reals, pair: Integers, deep: Fla
     """
     room, near = np.empty((ROOM, 3)), np.zeros((2, 3))
     T, w, middle = unplaced(layout)
-    reach, first, second, root, count, at = (
-        layout.reach,
-        layout.first,
-        layout.second,
-        layout.trees.root,
-        len(layout.first),
-        -1,
-    )
+    reach, first, second = layout.reach, layout.first, layout.second
+    root, count, at = layout.trees.root, len(first), -1
     for n in range(q.shape[0]):
         place(layout, q[n], T, w, middle)
         start, best, at, inside = max(at, 0), np.inf, -1, False

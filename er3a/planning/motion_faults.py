@@ -159,7 +159,7 @@ def by_kind(parts: Iterable[CausedT]) -> dict[PathVerdict, list[CausedT]]:
 
     Returns
     -------
-    found : the most serious kind first; only kinds that there are
+    found : the most serious kind first; kinds without any are left out
     """
     found: dict[PathVerdict, list[CausedT]] = {kind: [] for kind in PATH_VERDICTS}
     for part in parts:
