@@ -22,6 +22,7 @@ from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Integers, Reals
+from er3a.pipeline.language import own_title
 from er3a.pipeline.viewing.palette import BODY, GRID, JOINTS, PLATE, SHELL, link_colour
 from er3a.robots.joint_limits import size_of, theta_limits
 from er3a.robots.robot import Robot
@@ -198,7 +199,11 @@ def stand(robot: Robot, floor: float | None) -> list[Shape]:
 
 def drawn_scene(solids: Sequence[Solid], robot: Robot, frame: int = 0) -> list[Shape]:
     """Solids in the world, or in a frame of the arm that carries them; planes are pale squares near the arm's base."""
-    return [{"frame": frame, "name": solid.name, "colour": SCENE_COLOUR, **_measures(solid, robot)} for solid in solids]
+    return [
+        {"frame": frame, "name": solid.name, "label": own_title(solid.name), "colour": SCENE_COLOUR}
+        | _measures(solid, robot)
+        for solid in solids
+    ]
 
 
 def _measures(solid: Solid, robot: Robot) -> Shape:

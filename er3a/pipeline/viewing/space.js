@@ -254,7 +254,7 @@ export class Space extends Orbit {
       const corners = small || max.z - min.z > max.x - min.x ? [] : [min.x, max.x].flatMap((x) => [min.y, max.y].map((y) => [x, y, max.z])); // of a wide top, on which others stand
       return corners.filter((at) => (([u, v]) => u > 0 && u < this.width && v < this.height)(this.seen(at))).sort((a, b) => this.seen(b)[1] - this.seen(a)[1])[0] ?? [...middle.slice(0, 2), max.z];
     });
-    named.forEach(({ shape: { name } }, k) => this.word(name, tops[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name) || named.length < 10));
+    named.forEach(({ shape: { name, label } }, k) => this.word(label ?? name, tops[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name) || named.length < 10));
   }
 
   #light() {
