@@ -365,6 +365,7 @@ def page_environment(*folders: Path) -> jinja2.Environment:
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "ensure_ascii": False}  # `closed_up` reads texts
     environment.globals |= {"view_command": view_command, "numbered": Numbering(), "bracketed": bracketed}
     environment.filters |= {
         "number": number,
