@@ -151,14 +151,15 @@ def motion_seen(found: Finding) -> str:
 @says("look_at_motion")
 def _(found: Finding) -> str:
     motion = motion_seen(found)
-    pose = joined([as_text(angle, "g") for angle in found.pose_deg], ", ")
+    pose = ", ".join(as_text(angle, "g") for angle in found.pose_deg)
     start = with_unit(f"({pose})", "deg") if any(found.pose_deg) else tr("the zero pose")
     return say_as(found, start=start, motion=motion)
 
 
 def entry_word(entry: str) -> str:
     """An entry's name as the table's columns have it, such as ``α6``."""
-    for spelled, written in {"alpha": "α", "beta": "β", "offset": "offset ", "direction": "direction "}.items():
+    named = {"alpha": "α", "beta": "β", "offset": tr("offset") + " ", "direction": tr("direction") + " "}
+    for spelled, written in named.items():
         entry = entry.replace(spelled, written)
     return entry
 

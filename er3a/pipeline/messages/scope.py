@@ -150,7 +150,7 @@ names_in_words("own_values", "group", GROUP_NAMES)
 def open_names(found: Open, most: int | None = None) -> str:
     """Of which, in the language in use; beyond ``most`` how many more."""
     code, words = _words.get(found.reason, ("", {}))
-    named = [word(code, words, name) for name in found.names[:most]]
+    named = [own_title(word(code, words, name)) for name in found.names[:most]]
     rest = len(found.names) - len(named)
     return joined([*named, *([sentence("more", count=rest)] if rest else [])], ", ")
 

@@ -221,7 +221,7 @@ def shortened(names: Sequence[str]) -> str:
     for name in names:
         kind = name.rstrip("0123456789")
         by_kind.setdefault(kind, []).append(name[len(kind) :])
-    return joined((f"{kind} {', '.join(own)}" if own[0] else kind for kind, own in by_kind.items()), ", ")
+    return joined((f"{tr(kind)} {', '.join(own)}" if own[0] else kind for kind, own in by_kind.items()), ", ")
 
 
 @says("contradiction")
