@@ -5,7 +5,7 @@ from __future__ import annotations
 from er3a.finding import Amount, Finding, is_one
 from er3a.pipeline.language import as_text, own_title, tr, with_unit, words
 from er3a.pipeline.messages.pages import SIDES
-from er3a.pipeline.messages.say import WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import WORDS, bracketed, say, say_as, says, sentence, texts, word
 from er3a.references.subjects import Subject
 
 GROUP_WORDS = words(

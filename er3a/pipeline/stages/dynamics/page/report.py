@@ -173,7 +173,8 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     rows, still = [], []
     for motor in order:
         path, t, off = _moment_of(results, motor)
-        rows.append(_row(motor, (motor.peak, off), joined([f"J{motor.joint}", path], ", "), (path, t), scale, motor.peak_limit))
+        title = joined([f"J{motor.joint}", path], ", ")
+        rows.append(_row(motor, (motor.peak, off), title, (path, t), scale, motor.peak_limit))
         name, held = holding_name(motor.joint), summary.holding[motor.joint - 1]
         still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), scale))
     left = [
