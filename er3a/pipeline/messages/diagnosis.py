@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.finding import Finding, is_one
-from er3a.pipeline.language import as_text, with_unit, words
+from er3a.pipeline.language import as_text, tr, with_unit, words
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.pages import SIDES
 from er3a.pipeline.messages.say import FORMATS, WORDS, joined, listed, say_as, says, sentence, texts, word
@@ -166,7 +166,8 @@ def _(found: Finding) -> str:
     if is_one(found, "wrong_limit"):
         entry = f"J{found.joint} {word('side', SIDES, found.side)}"
     else:
-        entry = f"{str(entry_of(found)).removesuffix(str(found.joint))}{'' if mm else ' '}{found.joint}"
+        column = str(entry_of(found)).removesuffix(str(found.joint))
+        entry = f"{tr(column)}{'' if mm else ' '}{found.joint}"
     shown_values = [with_unit(text, "mm" if mm else "deg") for text in (as_text(given, ".6g"), fitted(given, fits))]
     return sentence("wrong_value", entry=entry, given=shown_values[0], fits=shown_values[1])
 
