@@ -207,7 +207,7 @@ def _both_arms(
             said = with_unit(
                 joined([cell["value"], gives], " → " if kind == "wrong" else tr(" or ")), "deg" if angle else "mm"
             )
-            text = f"{entry_word(entry)}: {said}{'?' * (kind == 'open')}"
+            text = joined([entry_word(entry), said + "?" * (kind == "open")], ": ")
             labels.append(Label(text, lines[entry].mean(0), kind, entry))
         over.append(DrawnLine(lines[entry], f"mark {own.kind}", entry))
         if angle and kind == "open" and gives:
