@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from er3a.finding import Amount, Finding, is_one
-from er3a.pipeline.language import as_text, own_title, tr, with_unit, words
+from er3a.pipeline.language import N_, as_text, own_title, tr, with_unit, words
 from er3a.pipeline.messages.pages import SIDES
 from er3a.pipeline.messages.say import WORDS, bracketed, say, say_as, says, sentence, texts, word
 from er3a.references.subjects import Subject
@@ -156,11 +156,15 @@ def _(found: Finding) -> str:
     return say_as(found, start=start, motion=motion)
 
 
+ENTRIES = {"offset": N_("offset"), "direction": N_("direction"), **SIDES}
+
+
 def entry_word(entry: str) -> str:
     """An entry's name as the table's columns have it, such as ``α6``."""
-    named = {"alpha": "α", "beta": "β", "offset": tr("offset") + " ", "direction": tr("direction") + " "}
-    for spelled, written in named.items():
+    for spelled, written in {"alpha": "α", "beta": "β"}.items():
         entry = entry.replace(spelled, written)
+    for column, named in ENTRIES.items():
+        entry = entry.replace(column, f"{tr(named)} ")
     return entry
 
 
