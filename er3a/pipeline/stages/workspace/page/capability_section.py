@@ -16,7 +16,7 @@ from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.workspace import reached_text, run_again_text, stand_text
 from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.stages.workspace import model
@@ -51,7 +51,7 @@ def _hindered(placing: Placing) -> Markup:
     named, others = list[Markup](), list[Markup]()
     for stage, met in here.met.items():
         for name, each in met.items():
-            link = Markup('<a href="{}">{}</a> ({})').format(
+            link = Markup(bracketed('<a href="{}">{}</a>', "{}")).format(
                 address_of(stage, name, each.t, "player"), page.breakable(name), each.body
             )
             (named if name in hindered.get(stage, ()) else others).append(link)
@@ -63,7 +63,7 @@ def _hindered(placing: Placing) -> Markup:
 def _sentence(links: Sequence[Markup], about: str = "") -> list[Markup]:
     """Links as a sentence; none where there are none."""
     lead = escape(about + tr(": ") if about else "")
-    return [lead + Markup(", ").join(links) + "."] if links else []
+    return [lead + Markup(tr(", ")).join(links) + tr(". ").strip()] if links else []
 
 
 SHADES = "viridis_r"
