@@ -116,4 +116,4 @@ def _(results: VisionResults) -> Glance:
 
 
 def _caught(count: int) -> str:
-    return tr("{count} caught", count=count) if count else ""
+    return tr("faults caught: {count}", count=count) if count else ""

@@ -165,7 +165,7 @@ def _cell(verdict: StageVerdict, heads: Mapping[str, Head], stored: Results) -> 
     if head is None or head.status == "not_computed":
         return StageCell(stage, "not_computed", "–", tr("not computed"), head.text if head else "")
     if head.no_verdict:
-        return StageCell(stage, "no_verdict", "", "")
+        return StageCell(stage, "no_verdict", "", tr("wrong table"))
     value, note = glance(stored[stage].results)
     if verdict.said_by:
         note = tr("see {stages}", stages=tr(PAGES[verdict.said_by]))

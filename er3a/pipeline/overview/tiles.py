@@ -24,7 +24,7 @@ from er3a.pipeline.viewing.answer import ListRow, Mark
 from er3a.pipeline.viewing.page import whole_sentence
 
 Results = Mapping[str, Stored[Any]]
-FEW = 4  # rows of a tile: so many are seen whole on the first screen
+FEW = 5  # rows of a tile: so many are seen whole on the first screen
 LETTERS = 0.14  # of the reach, in the small view from above
 
 
@@ -33,7 +33,7 @@ class Tile:
     """An answer, which leads to its page, and its picture.
 
     ``asked``: what it answers, by ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``,
-    ``rows``, ``drawing`` with ``keys``: what is shown, one of them; ``more``: how many rows are left to the page.
+    ``rows``, ``drawing`` with ``keys``: what is shown, one of them.
     """
 
     asked: str
@@ -43,7 +43,6 @@ class Tile:
     address: str
     entries: Mapping[str, Any] | None = None
     rows: Sequence[ListRow] = ()
-    more: int = 0
     drawing: str = ""
     keys: Sequence[tuple[str, str]] = ()
 
@@ -90,7 +89,7 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
     page = f"{name}/{found.stage}.html"
     asked = tr("Which {what} fail?", what=what)
-    return Tile(asked, said.headline, said.rest, sound, page, rows=rows[:FEW], more=len(rows[FEW:]))
+    return Tile(asked, said.headline, said.rest, sound, page, rows=rows[:FEW])
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:

@@ -106,8 +106,7 @@ export class SolutionList {
   #verdict(row) {
     const { words } = this.data;
     const at = this.#atLimit(row).join(", ");
-    if (row.withinLimits && at) return fill(words.within_at, { joints: at });
-    if (row.withinLimits) return words.within;
+    if (row.withinLimits) return at && fill(words.within_at, { joints: at });
     const [beyond] = excesses(this.data.table, row.q); // all of it is said when it is asked for
     const { name, text } = limited(this.data, beyond);
     return fill(words.leaves, { joint: name, excess: text(beyond.excess, 0) });

@@ -27,13 +27,11 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
 from er3a.pipeline.stages.validation.page.evidence_section import (
-    SETTLED,
     evidence_section,
     known_alone,
     other_robot,
     plain_table,
     poses_to_read,
-    status_of,
     to_settle,
 )
 from er3a.pipeline.study import Study
@@ -195,7 +193,7 @@ def _both_arms(
     worst = [row.address for row in evidence.get("first", ())[:LABELLED]]
     radius = RADIUS * float(np.ptp(own.points_mm, axis=0).max())
     for entry, cell in cells.items():
-        column, kind, gives = column_of(entry), _kind(cell["status"]), cell["gives"]
+        column, kind, gives = column_of(entry), cell["look"], cell["gives"]
         if column == "direction" and kind == "open":
             if disputed:  # what is asked is a length
                 continue
@@ -284,10 +282,6 @@ def _headed(line: Reals, size: float) -> Reals:
     return found
 
 
-def _kind(status: str) -> LabelKind:
-    return "wrong" if status == "contradicted" else "sound" if status in SETTLED else "open"
-
-
 def _answer(
     study: Study, robot: str, summary: model.ValidationSummary, instead: str | None, disputed: Sequence[model.Conflict]
 ) -> Answer:
@@ -297,15 +291,8 @@ def _answer(
     bad, unsure = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
     headline, rest = _headline(summary, bad, unsure)
     keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.passed < counts.total else []
-    below = ""
     if evidence and bad:
         keys.append((f"{bad}/{known_alone(evidence)}", tr("entries contradicted")))
-    elif evidence and unsure:
-        settled = sum(status_of(each) == "settled" for each in evidence.entries)
-        signs = known_alone(evidence) - unsure - settled
-        below = tr(
-            "{settled} settled, {signs} but for signs, {left} to confirm.", settled=settled, signs=signs, left=unsure
-        )
     values = [stated.expected for each in disputed[:1] for stated in each.statements]
     if disputed:
         off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)
@@ -325,7 +312,7 @@ def _answer(
         fix = Fix(to_settle(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
         fix = Fix(tr("read five poses at the pendant: er3a confirm {robot} --plan", robot=robot), instead=False)
-    return Answer(headline, rest, below, keys, (), fix)
+    return Answer(headline, rest, "", keys, (), fix)
 
 
 def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[str, str]:
