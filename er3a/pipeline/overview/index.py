@@ -8,13 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from er3a.by_value import frozen
 from er3a.files.kept_files import write_text
 from er3a.finding import is_one
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.say import joined
-from er3a.pipeline.messages.workspace import reaches
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.overview.search import places
 from er3a.pipeline.overview.tiles import first_with, motions_tile, table_tile, tray_tile
@@ -29,7 +30,16 @@ from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.drawn import floor_of
 from er3a.pipeline.viewing.page import PAGES, Head, head_of
-from er3a.pipeline.viewing.side_view import Kind, SeenArm, beyond, border_lines, seen_arm, side_view, through_floor
+from er3a.pipeline.viewing.side_view import (
+    Kind,
+    Label,
+    SeenArm,
+    beyond,
+    border_lines,
+    seen_arm,
+    side_view,
+    through_floor,
+)
 
 USES = ("use", "plan", "measure", "never")  # from what may be relied on most
 MAX_CHANGED = 6  # files that have changed since, and are named
@@ -181,7 +191,9 @@ def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Resul
     labels = through_floor(seen, floor_mm)
     for arm, entry in zip(seen, drawn):
         if reach := _reach(stored[entry.name]):
-            labels += void_labels(reach, arm.kind)
+            outline = np.concatenate(arm.reach_mm)
+            said = joined([arm.title, arm.note], " ")
+            labels += [Label(said, outline[outline[:, 0].argmax()], arm.kind), *void_labels(reach, arm.kind)]
     return side_view(seen, floor_mm, ratio=2.06, labels=labels, column_mm=beyond(seen))
 
 
@@ -195,7 +207,7 @@ def _seen(study: Study, name: str, use: str, stored: Results) -> SeenArm:
     robot, summary, kind = study.robot(name), _reach(stored), "wrong" if use == "never" else "right"
     note, lines = "", []
     if summary:
-        note = reaches(summary)
+        note = tr("reaches {far}", far=glance(stored["workspace"].results)[0])
         border = stored["workspace"].results.border
         lines = border_lines(border.arc, border.rho_m, border.z_m)
     return seen_arm(robot, own_title(robot.title), note, kind, lines)

@@ -201,14 +201,6 @@ WORDS: dict[str, Any] = {
     "nothing_meets": N_("No bodies here can collide."),
 }
 
-FOUNDATION_WORDS = {  # of validation's foundation, for the mark in the header
-    "fail": N_("D-H table contradicted"),
-    "caution": N_("D-H table partly settled"),
-    "unsettled": N_("D-H values not settled"),
-    "no_reference": N_("D-H table unchecked"),
-    "not_computed": N_("D-H table unchecked"),
-}
-
 
 SIX = 6
 _HERE = Path(__file__).parent
@@ -309,7 +301,6 @@ def write_panel(
         joint_colours=JOINTS,
         degrees=float(np.degrees(1.0)),
         words=panel["words"],
-        foundation=tr(FOUNDATION_WORDS[first_caveat.status]) if first_caveat else "",
         first_caveat=first_caveat,
         instead=instead,
         condition=condition,

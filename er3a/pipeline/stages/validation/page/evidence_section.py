@@ -36,7 +36,12 @@ LOOKS: Mapping[Status, str] = {
     "gauge": "free",
     "given": "free",
 }
-LEGEND = {"sound": N_("✓ {count} keep"), "open": N_("? {count} confirm"), "wrong": N_("✗ {count} wrong → instead")}
+LEGEND = {
+    "sound": N_("✓ {count} keep"),
+    "open": N_("? {count} confirm"),
+    "wrong": N_("✗ {count} wrong → instead"),
+    "free": N_("{count} free"),
+}
 MARKS = {"sound": "✓", "open": "?", "wrong": "✗", "free": "–"}
 FIRST = 8  # entries to settle, named at the table's side
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
