@@ -138,7 +138,6 @@ WORDS: dict[str, Any] = {
         "elbow": N_("from straight or folded"),
         "shoulder": N_("wrist centre from the plane of axes 1 and 2"),
     },
-    "states": {"clear": N_("clear"), "near": N_("near"), "at": N_("singular")},
     "clear": N_("Clear: no contact, limit or singularity."),
     "touch": {"near": N_("Near contact."), "at": N_("Collision.")},
     "near": {
