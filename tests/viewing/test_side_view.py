@@ -19,12 +19,13 @@ def seen_at(*reaches: float) -> list[int]:
     return [int(value) for value in box.split()]
 
 
-def test_what_a_wrong_arm_reaches_is_seen_whole():
+def test_what_a_wrong_arm_reaches_does_not_make_the_arms_small():
     left, top, width, height = seen_at(1.0, 2.0)
-    assert left < -1400
-    assert top < -1400
-    assert left + width > 1400
-    assert top + height > 1400
+    assert left < -700
+    assert top < -700
+    assert left + width > 700
+    assert top + height > 700
+    assert [left, top, width, height] == seen_at(1.0, 1.0)
 
 
 def test_the_floor_is_named_and_below_the_arm():

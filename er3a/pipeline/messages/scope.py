@@ -81,7 +81,7 @@ ASSUMED: Mapping[str, str] = words(
         "capability": "tool directions were not computed",
         "places": "no place for the tray was looked for",
         "tray_nowhere": "no place for the tray was found",
-        "references": "no reference states these",
+        "references": "not compared, as no document states them",
         "loose_references": "references too loose to tell",
         "tool_and_base": "the study's tool and base",
         "link_masses": "links without a mass weigh nothing",

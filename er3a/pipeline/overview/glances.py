@@ -8,7 +8,6 @@ import numpy as np
 
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.collision.model import CollisionResults
 from er3a.pipeline.stages.dynamics.model import DynamicsResults
 from er3a.pipeline.stages.inverse.model import InverseResults
@@ -20,7 +19,7 @@ from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import sound_motions
-from er3a.pipeline.stages.workspace.page.workspace_figures import litres
+from er3a.pipeline.stages.workspace.page.workspace_figures import about
 
 Glance = tuple[str, str]
 
@@ -44,23 +43,22 @@ def glance(results: object) -> Glance:
 def _(results: ValidationResults) -> Glance:
     summary = results.summary
     counts, evidence = summary.counts.independent, summary.evidence
-    value = f"{counts.passed}/{counts.total}" if counts.total else "–"
+    value = f"{counts.passed}/{counts.total}" if counts.total else "0"
     if summary.verdict.status == "fail":
         bad = evidence.contradicted if evidence else 0
         return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
     for conflict in summary.conflicts[:1]:
         stated = [each.expected for each in conflict.statements]
         return value, tr("sources differ by {off}", off=with_unit(fixed(max(stated) - min(stated), 1), conflict.unit))
-    if not evidence or not evidence.unconfirmed:
-        return value, ""
-    return tr("{count} to confirm", count=len(evidence.unconfirmed)), joined([value, tr("checks")], " ")
+    left = len(evidence.unconfirmed) if evidence else 0
+    return value, tr("{count} to confirm", count=left) if left else ""
 
 
 @glance.register
 def _(results: WorkspaceResults) -> Glance:
     summary = results.summary
     far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
-    sizes = [with_unit(litres(void), "L") for void in summary.voids if void.holds_shoulder]
+    sizes = [about(void) for void in summary.voids if void.holds_shoulder]
     return far, tr("void {size}", size=sizes[0]) if sizes else with_unit(fixed(summary.volume_m3.middle, 2), "m³")
 
 
@@ -100,9 +98,9 @@ def _(results: DynamicsResults) -> Glance:
     if not motors:
         return "–", tr("masses unknown")
     worst = max(motors, key=lambda motor: max(motor.peak, motor.holding))
-    if worst.holding > worst.peak:
-        return with_unit(number(worst.holding, 2), worst.unit), tr("J{joint} holding", joint=worst.joint)
-    return with_unit(number(worst.peak, 2), worst.unit), tr("J{joint} moving", joint=worst.joint)
+    judged = results.summary.verdict.status != "no_reference"
+    note = tr("J{joint}", joint=worst.joint) if judged else tr("J{joint}, not judged", joint=worst.joint)
+    return with_unit(number(max(worst.peak, worst.holding), 2), worst.unit), note
 
 
 @glance.register
@@ -116,4 +114,4 @@ def _(results: VisionResults) -> Glance:
 
 
 def _caught(count: int) -> str:
-    return tr("{count} caught", count=count) if count else ""
+    return tr("faults caught: {count}", count=count) if count else ""

@@ -14,7 +14,6 @@ from er3a.finding import is_one
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.say import joined
-from er3a.pipeline.messages.workspace import reaches
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.overview.search import places
 from er3a.pipeline.overview.tiles import first_with, motions_tile, table_tile, tray_tile
@@ -22,16 +21,17 @@ from er3a.pipeline.results import THE_CODE, THE_SETTINGS, Provenance, Stored, is
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.validation.page.evidence_section import to_confirm
-from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
-from er3a.pipeline.stages.workspace.page.workspace_figures import void_labels
+from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.workspace.page.workspace_figures import labelled
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.drawn import floor_of
 from er3a.pipeline.viewing.page import PAGES, Head, head_of
-from er3a.pipeline.viewing.side_view import Kind, SeenArm, beyond, border_lines, seen_arm, side_view, through_floor
+from er3a.pipeline.viewing.side_view import seen_arm, side_view
 
 USES = ("use", "plan", "measure", "never")  # from what may be relied on most
+WIDE = 2.06  # width of the picture, of its height
 MAX_CHANGED = 6  # files that have changed since, and are named
 Results = Mapping[str, Stored[Any]]
 """The results of a robot's stages that are there, by stage."""
@@ -56,7 +56,6 @@ class RobotRow:
     ----------
     decision, use : what to do with it, in few words, and in one: ``plan``, ``never``, ``measure``
     cells : in the order of the stages; None where a stage was not asked for
-    seen : the arm and what it reaches, small
     outdated : what has changed since its results were computed; empty where nothing has
     """
 
@@ -65,7 +64,6 @@ class RobotRow:
     use: str
     decision: str
     cells: Sequence[StageCell | None]
-    seen: str
     outdated: str
 
 
@@ -136,8 +134,7 @@ def _entry(study: Study, name: str, stored: Results, verdicts: Sequence[StageVer
     table = own["validation"].status if "validation" in own else "not_examined"
     use, said = _use(table, heads.get("validation"), failed)
     cells = [_cell(own[each], heads, stored) if each in own else None for each in _asked(study)]
-    arm, changed = _seen(study, name, use, stored), _changed_text(own.values())
-    return RobotRow(name, arm.title, use, said, cells, side_view([arm], ratio=1.0), changed)
+    return RobotRow(name, own_title(study.robot(name).title), use, said, cells, _changed_text(own.values()))
 
 
 def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str]:
@@ -165,7 +162,7 @@ def _cell(verdict: StageVerdict, heads: Mapping[str, Head], stored: Results) -> 
     if head is None or head.status == "not_computed":
         return StageCell(stage, "not_computed", "–", tr("not computed"), head.text if head else "")
     if head.no_verdict:
-        return StageCell(stage, "no_verdict", "", "")
+        return StageCell(stage, "no_verdict", "", tr("wrong table"))
     value, note = glance(stored[stage].results)
     if verdict.said_by:
         note = tr("see {stages}", stages=tr(PAGES[verdict.said_by]))
@@ -173,32 +170,16 @@ def _cell(verdict: StageVerdict, heads: Mapping[str, Head], stored: Results) -> 
 
 
 def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
-    """The arm that may be relied on, with its voids, and over it the wrong one."""
-    name = drawn[0].name
-    floor = floor_of(study.scene(name, "trajectory"))
-    floor_mm = floor and 1000 * floor
-    seen = [_seen(study, entry.name, entry.use, stored[entry.name]) for entry in drawn]
-    labels = through_floor(seen, floor_mm)
-    for arm, entry in zip(seen, drawn):
-        if reach := _reach(stored[entry.name]):
-            labels += void_labels(reach, arm.kind)
-    return side_view(seen, floor_mm, ratio=2.06, labels=labels, column_mm=beyond(seen))
-
-
-def _reach(stored: Results) -> WorkspaceSummary | None:
-    results = stored["workspace"].results if "workspace" in stored else None
-    return results.summary if isinstance(results, WorkspaceResults) else None
-
-
-def _seen(study: Study, name: str, use: str, stored: Results) -> SeenArm:
-    kind: Kind
-    robot, summary, kind = study.robot(name), _reach(stored), "wrong" if use == "never" else "right"
-    note, lines = "", []
-    if summary:
-        note = reaches(summary)
-        border = stored["workspace"].results.border
-        lines = border_lines(border.arc, border.rho_m, border.z_m)
-    return seen_arm(robot, own_title(robot.title), note, kind, lines)
+    """The arm that may be relied on, with its voids, and over it the wrong one; without what they reach where that was
+    not computed."""
+    robots = [study.robot(entry.name) for entry in drawn]
+    reached = [stored[entry.name]["workspace"].results for entry in drawn if "workspace" in stored[entry.name]]
+    wrong = drawn[-1].use == "never"
+    if len(reached) == len(drawn) and all(isinstance(each, WorkspaceResults) for each in reached):
+        floor = floor_of(study.scene(drawn[0].name, "trajectory"))
+        return labelled([*zip(robots, reached)], floor and 1000 * floor, wrong, WIDE)
+    arms = [seen_arm(robot, own_title(robot.title), "") for robot in robots]
+    return side_view([*arms[:-1], replace(arms[-1], kind="wrong") if wrong else arms[-1]], ratio=WIDE)
 
 
 def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from er3a.by_value import frozen
-from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.language import tr
 from er3a.pipeline.messages.dynamics import payload_key
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.results import Stored
@@ -24,7 +25,7 @@ from er3a.pipeline.viewing.answer import ListRow, Mark
 from er3a.pipeline.viewing.page import whole_sentence
 
 Results = Mapping[str, Stored[Any]]
-FEW = 4  # rows of a tile: so many are seen whole on the first screen
+FEW = 7  # rows of a tile: so many are seen whole on the first screen
 LETTERS = 0.14  # of the reach, in the small view from above
 
 
@@ -33,7 +34,7 @@ class Tile:
     """An answer, which leads to its page, and its picture.
 
     ``asked``: what it answers, by ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``,
-    ``rows``, ``drawing`` with ``keys``: what is shown, one of them; ``more``: how many rows are left to the page.
+    the first ``rows`` of ``all`` below a ``heading``, ``drawing`` with ``keys``: what is shown, one of them.
     """
 
     asked: str
@@ -43,7 +44,8 @@ class Tile:
     address: str
     entries: Mapping[str, Any] | None = None
     rows: Sequence[ListRow] = ()
-    more: int = 0
+    all: int = 0
+    heading: str = ""
     drawing: str = ""
     keys: Sequence[tuple[str, str]] = ()
 
@@ -76,7 +78,7 @@ def table_tile(name: str, stored: Results) -> Tile | None:
 
 
 def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
-    """Which paths or programs of a robot fail, each with its bar over time.
+    """Which paths or programs of a robot pass, by name, and the others, each with its bar over time.
 
     Parameters
     ----------
@@ -88,9 +90,11 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     said = answer(study.robot(name), results)
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
+    good = joined([row.name for row in rows if row.mark == "pass"], ", ")
+    others = [row for row in rows if row.mark != "pass"]
     page = f"{name}/{found.stage}.html"
-    asked = tr("Which {what} fail?", what=what)
-    return Tile(asked, said.headline, said.rest, sound, page, rows=rows[:FEW], more=len(rows[FEW:]))
+    asked = tr("Which {what} may run?", what=what)
+    return Tile(asked, said.headline, good, sound, page, rows=others[:FEW], all=len(others), heading=said.rest)
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
@@ -101,7 +105,7 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     robot, results = study.robot(name), stored["workspace"].results
     drawing = from_above(robot, results, study.scene(name, "capability"), placing.tray, LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
-    answer = whole_sentence(with_unit(millimetres(placing.tray.place.centre_m), "mm"))
+    answer = tr("Centre (x, y, z) {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
     voids = [
         (about(void), if_normal(void, void_name(k, void)))
         for k, void in enumerate(results.summary.voids, 1)

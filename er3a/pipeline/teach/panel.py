@@ -138,7 +138,6 @@ WORDS: dict[str, Any] = {
         "elbow": N_("from straight or folded"),
         "shoulder": N_("wrist centre from the plane of axes 1 and 2"),
     },
-    "states": {"clear": N_("clear"), "near": N_("near"), "at": N_("singular")},
     "clear": N_("Clear: no contact, limit or singularity."),
     "touch": {"near": N_("Near contact."), "at": N_("Collision.")},
     "near": {
@@ -158,8 +157,7 @@ WORDS: dict[str, Any] = {
     "count": N_("{within} of {total} within the limits"),
     "count_colliding": N_("{within} of {total} within the limits, of these {colliding} in collision"),
     "current": N_("the arm is here"),
-    "within": N_("within the limits"),
-    "within_at": N_("within the limits, {joints} at the limit"),
+    "within_at": N_("{joints} at the limit"),
     "leaves": N_("{joint} {excess} over"),
     "separator": N_("; "),
     "above": N_("{joint} at {angle} is {excess} above its limit of {limit}"),
@@ -200,14 +198,6 @@ WORDS: dict[str, Any] = {
     },
     "collides": N_("collision: {pair}"),
     "nothing_meets": N_("No bodies here can collide."),
-}
-
-FOUNDATION_WORDS = {  # of validation's foundation, for the mark in the header
-    "fail": N_("D-H table contradicted"),
-    "caution": N_("D-H table partly settled"),
-    "unsettled": N_("D-H values not settled"),
-    "no_reference": N_("D-H table unchecked"),
-    "not_computed": N_("D-H table unchecked"),
 }
 
 
@@ -310,7 +300,6 @@ def write_panel(
         joint_colours=JOINTS,
         degrees=float(np.degrees(1.0)),
         words=panel["words"],
-        foundation=tr(FOUNDATION_WORDS[first_caveat.status]) if first_caveat else "",
         first_caveat=first_caveat,
         instead=instead,
         condition=condition,

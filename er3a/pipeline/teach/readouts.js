@@ -47,7 +47,6 @@ export function showMeasures(data, T, tight) {
     const row = byId(`factor-${kind}`);
     row.dataset.state = state;
     write(row.querySelector(".value"), shown);
-    write(row.querySelector(".state"), words.states[state]);
     row.querySelector(".fill").style.width = `${Math.min(100, (100 * distance) / full[kind])}%`;
     row.querySelector(".mark").style.left = `${(100 * near[kind]) / full[kind]}%`;
   }

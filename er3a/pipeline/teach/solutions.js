@@ -29,8 +29,7 @@ export class SolutionList {
     const { words } = this.data;
     const { rows, unsolved, free } = inverse(this.data.table, this.arm, T, q);
     if (!rows.some((row) => same(row.q, q))) rows.push({ slot: null, q: [...q], withinLimits: true });
-    this.rows = rows;
-    this.buttons = [];
+    Object.assign(this, { rows, buttons: [], reason: "" });
     const items = [];
     const branches = []; // of each its first row: whole turns change nothing
     for (const slot of [0, 1, 2, 3, 4, 5, 6, 7, null]) {
@@ -94,7 +93,9 @@ export class SolutionList {
   #missing({ slot, fault, gap }) {
     const { words, branch_labels: labels } = this.data;
     const reason = fill(words.missing, { reason: faultWords(words, fault, gap) });
-    return element("li", "branch missing", "", [element("b", "", labels[slot]), element("span", "row-verdict", reason)]);
+    const again = reason === this.reason; // as that of the branch before: it is said once
+    this.reason = reason;
+    return element("li", "branch missing", "", [element("b", "", labels[slot]), element("span", "row-verdict", again ? "″" : reason)]);
   }
 
   /** Names of the joints that stand at a limit. */
@@ -106,8 +107,7 @@ export class SolutionList {
   #verdict(row) {
     const { words } = this.data;
     const at = this.#atLimit(row).join(", ");
-    if (row.withinLimits && at) return fill(words.within_at, { joints: at });
-    if (row.withinLimits) return words.within;
+    if (row.withinLimits) return at && fill(words.within_at, { joints: at });
     const [beyond] = excesses(this.data.table, row.q); // all of it is said when it is asked for
     const { name, text } = limited(this.data, beyond);
     return fill(words.leaves, { joint: name, excess: text(beyond.excess, 0) });

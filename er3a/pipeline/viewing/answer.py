@@ -87,6 +87,7 @@ class Answer:
     below : one sentence below the verdict, or nothing
     keys : two or three figures, each with what it is
     groups : of the list; those without rows are left out
+    good : whether the headline holds though the verdict is a caution; the rest then says what is open
     """
 
     headline: str
@@ -95,6 +96,7 @@ class Answer:
     keys: Sequence[tuple[str, str]] = ()
     groups: Sequence[Group] = ()
     fix: Fix | None = None
+    good: bool = False
 
     @property
     def shown_groups(self) -> list[Group]:

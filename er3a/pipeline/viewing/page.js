@@ -664,7 +664,7 @@ returnToPlace();
 const entryOf = (hash) => hash?.slice(1).replace(/^(cell|entry)-/, "") || null;
 const entryLinks = document.querySelectorAll(".runs a[href^='#cell-'], .grid .entries a");
 const evidence = Object.assign(document.createElement("b"), { className: "evidence", role: "status" });
-document.querySelector(".grid .key")?.prepend(evidence);
+document.querySelector(".grid .key")?.append(evidence);
 const next = document.querySelector(".hero:has(.look) .fix"), first = next && [next.querySelector("span").lastChild.data, next.querySelector("a").hash];
 function showEntry(entry = entryOf(location.hash)) {
   for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
@@ -678,6 +678,7 @@ for (const link of entryLinks) {
   link.addEventListener("pointerenter", () => showEntry(entryOf(link.hash)));
   link.addEventListener("pointerleave", () => showEntry());
 }
+for (const part of document.querySelectorAll(".hero svg [data-entry]")) part.addEventListener("click", () => (location.hash = `cell-${part.dataset.entry}`));
 addEventListener("hashchange", () => showEntry());
 showEntry();
 // The one thing to do opens lines to copy, and plays the jog again.

@@ -34,7 +34,7 @@ from er3a.pipeline.messages.numbers import (
 )
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text, not_checked
+from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text
 from er3a.pipeline.results import (
     AbsentResults,
     Provenance,
@@ -228,11 +228,6 @@ class Head:
         return [gap_text(gap) for each in self.summary.verdict.missed for gap in each.gaps]
 
     @property
-    def missed(self) -> str:
-        """Which checks don't cover all, and why."""
-        return not_checked(tuple(each for each in self.summary.checked if not each.complete))
-
-    @property
     def banner(self) -> str:
         """On what assumed shapes all rests, as the text ends; empty where no shapes are assumed."""
         shapes = self.summary.verdict.shapes
@@ -398,7 +393,7 @@ def render_stage(
     study : that the results are of; the command at the page's foot names its file
     stored : what the stage found of a robot
     output : replaced whole, or left as it is
-    answer : its first screen; what was not checked comes before it where the verdict is no pass because of that. Where
+    answer : its first screen; that not all was checked follows it where the verdict is no pass because of that. Where
         evidence contradicts the table that all rests on it is shown only without a headline: it then says what is wrong
     context : what the template needs besides, by name
     """
@@ -406,7 +401,7 @@ def render_stage(
     head = framed["head"]
     if head.status == "caution" and head.gaps and stage != "validation":  # whose own headline says what is open
         below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
-        answer = replace(answer, headline=tr("Not fully checked."), rest=answer.headline, below=below)
+        answer = replace(answer, rest=tr("Not fully checked."), below=below, good=head.summary.verdict.lowered)
     if head.no_verdict:
         said = answer if not answer.headline else Answer("", tr("Nothing here holds for this robot."))
         answer = replace(said, headline=tr("Another arm's table."))

@@ -176,7 +176,10 @@ def side_view(
     -------
     drawing : colours come from the page's style sheet
     """
-    corners = np.concatenate([_corners(arms), *(line.points for line in over)])
+    # What another arm reaches may go beyond the drawing's edge: the arms are what is to be seen.
+    corners = np.concatenate(
+        [_corners(arms[:1]), *(arm.points_mm for arm in arms[1:]), *(line.points for line in over)]
+    )
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
     low, high = low - margin, high + margin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict
 from math import pi
@@ -24,16 +25,24 @@ from er3a.references.quantities import MM
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
-MARKS: Mapping[Status, str] = {
-    "settled": "✓",
-    "settled_up_to_signs": "(✓)",
-    "weak": "~",
-    "contradicted": "✗",
-    "consistent": "①",  # of one source: no sign that would be read as a confirmation
-    "open": "?",
-    "gauge": "↔",
-    "given": "·",
+# What to do with an entry is all that the grid says; why, its evidence does.
+LOOKS: Mapping[Status, str] = {
+    "settled": "sound",
+    "settled_up_to_signs": "sound",
+    "weak": "open",
+    "consistent": "open",
+    "open": "open",
+    "contradicted": "wrong",
+    "gauge": "free",
+    "given": "free",
 }
+LEGEND = {
+    "sound": N_("✓ {count} keep"),
+    "open": N_("? {count} confirm"),
+    "wrong": N_("✗ {count} wrong → instead"),
+    "free": N_("{count} free"),
+}
+MARKS = {"sound": "✓", "open": "?", "wrong": "✗", "free": "–"}
 FIRST = 8  # entries to settle, named at the table's side
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
@@ -78,14 +87,16 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     left.sort(key=lambda each: (not each.off.moves, _unbounded(each), -each.off.mm, -each.off.deg))
     proposals = {proposal.entry: to_settle(proposal) for proposal in evidence.proposals}
     todo = {each.entry: proposals[each.entry] for each in evidence.proposals if not is_one(each, "look_at_motion")}
+    counts = Counter(LOOKS[status_of(each)] for each in evidence.entries if each.value is not None)
     present = {status_of(each) for each in numbers}
     first = [ListRow("fail", entry_word(each.entry), _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence, todo) for kind in kinds]) for joint in joints],
-        legend=[
-            (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))
-            for status in MARKS
+        legend=[(look, tr(text, count=counts[look])) for look, text in LEGEND.items() if counts[look]],
+        meanings=[
+            (look, _status(status), word("status_meaning", STATUS_MEANINGS, status))
+            for status, look in LOOKS.items()
             if status in present
         ],
         open_columns=OPEN_COLUMNS,
@@ -218,16 +229,17 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, proposals: Mappin
     """An entry in the table; None where there is none."""
     if each is None or each.value is None:
         return None
-    single = len(each.by) == 1
+    look = LOOKS[status_of(each)]
     return dict(
         entry=each.entry,
         value=_plain(each.value),
         status=status_of(each),
-        mark=MARKS[status_of(each)] + MARKS["consistent"] * (single and status_of(each) == "settled"),
+        look=look,
+        mark=MARKS[look],
         title=tr("{entry}: {status}", entry=entry_word(each.entry), status=_status(status_of(each))),
         gives=_other_given(each, evidence),
         said=_said(each, evidence, proposals),
-        single=single,
+        unsure=len(each.by) == 1,
     )
 
 
@@ -247,11 +259,6 @@ def status_of(each: EntryEvidence) -> Status:
     return "settled" if each.status == "settled_up_to_signs" and column_of(each.entry) == "direction" else each.status
 
 
-def _marked(status: Status) -> str:
-    """A status with its mark."""
-    return f"{MARKS[status]} {_status(status)}"
-
-
 def _status(status: Status) -> str:
     return word("status", STATUS_WORDS, status)
 
@@ -264,7 +271,7 @@ def _row(each: EntryEvidence, evidence: TableEvidence) -> list[str]:
     return [
         entry_word(each.entry),
         with_unit(_plain(each.value or 0.0), each.unit),
-        _marked(status_of(each)),
+        _status(status_of(each)),
         _interval(each, evidence),
         joined(each.by, ", ") or "–",
     ]

@@ -27,13 +27,11 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
 from er3a.pipeline.stages.validation.page.evidence_section import (
-    SETTLED,
     evidence_section,
     known_alone,
     other_robot,
     plain_table,
     poses_to_read,
-    status_of,
     to_settle,
 )
 from er3a.pipeline.study import Study
@@ -66,11 +64,10 @@ ANGLES = ("alpha", "beta", "offset")
 AROUND = np.radians(np.linspace([-110.0, -220.0], [110.0, 80.0], 31)).T  # of an arrow over an axis, and around one
 HEAD = 0.5  # of its radius, the length of its head
 TILT = 0.5  # of a circle around an axis in the drawing's plane, seen a little from above
-RADIUS = 0.045  # of such an arrow, of the size of the arm
+RADIUS = 0.036  # of such an arrow, of the size of the arm
 BELOW = 0.15  # of a reach: from one line to the next below the base
 LARGER, GLASS = 10, 0.8  # the difference between what documents state, in a glass of this radius, of such a step
 ROUND = np.linspace(0.0, 2 * np.pi, 49)
-LABELLED = 5  # of the lengths that are wrong, at most, so that words have room
 AHEAD = 1.12  # of the way to a jogged arm's end: what is said of it
 UP, MARK_MM = [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)], 1000.0  # where a mark on the flange is that is seen to turn
 JOG = np.radians(np.linspace(0.0, 30.0, 13))  # of a joint that one looks at
@@ -158,7 +155,7 @@ def _both_arms(
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
     scale.
 
-    The lengths that evidence contradicts most are named, and angles that it leaves open. Where each entry is seen is
+    The lengths that evidence contradicts are named, and angles that it leaves open. Where each entry is seen is
     marked while it is asked for, with what the other arm has instead. Where documents contradict each other about a
     reach, the arm is stretched, and what each states is a dimension from axis 1 on below it, with its source; that of
     the table in its colour."""
@@ -192,10 +189,9 @@ def _both_arms(
         labels.append(Label(text, glass - [step, 1.4 * step], "open", "seen", written_there=True))
     cells = {cell["entry"]: cell for _, row in evidence.get("rows", ()) for cell in row if cell}
     lines, right = entry_lines(robot, cells, q), entry_lines(other, cells, q) if off and other else {}
-    worst = [row.address for row in evidence.get("first", ())[:LABELLED]]
     radius = RADIUS * float(np.ptp(own.points_mm, axis=0).max())
     for entry, cell in cells.items():
-        column, kind, gives = column_of(entry), _kind(cell["status"]), cell["gives"]
+        column, kind, gives = column_of(entry), cell["look"], cell["gives"]
         if column == "direction" and kind == "open":
             if disputed:  # what is asked is a length
                 continue
@@ -203,7 +199,7 @@ def _both_arms(
             over.append(replace(turn, points=_headed(turn.points[::-1], radius)) if cell["status"] == "open" else turn)
             continue
         angle = column in ANGLES
-        if not disputed and cell["status"] == "open" if angle else column in "ad" and f"#cell-{entry}" in worst:
+        if not disputed and cell["status"] == "open" if angle else column in "ad" and kind == "wrong":
             said = with_unit(
                 joined([cell["value"], gives], " → " if kind == "wrong" else tr(" or ")), "deg" if angle else "mm"
             )
@@ -233,7 +229,7 @@ def _look(robot: Robot, found: Finding) -> Markup:
         ways = np.stack([np.zeros_like(tips), MARK_MM * tips], axis=2)
     side = max(VIEWS, key=lambda each: np.linalg.norm((ways[0, -1, -1] - ways[0, 0, -1]) @ VIEWS[each]))
     own = int(robot.direction[found.joint - 1])
-    kinds: dict[Kind, str] = {"right": N_("this way: keep {value}"), "wrong": N_("this way: enter {value}")}
+    kinds: dict[Kind, str] = {"right": N_("keep {value}"), "wrong": N_("enter {value}")}
     arms = [
         SeenArm(tr(kinds[kind], value=fixed(value, 0)), "", kind, way[-1], way=way)
         for kind, way, value in zip(kinds, ways @ VIEWS[side], (own, -own))
@@ -284,10 +280,6 @@ def _headed(line: Reals, size: float) -> Reals:
     return found
 
 
-def _kind(status: str) -> LabelKind:
-    return "wrong" if status == "contradicted" else "sound" if status in SETTLED else "open"
-
-
 def _answer(
     study: Study, robot: str, summary: model.ValidationSummary, instead: str | None, disputed: Sequence[model.Conflict]
 ) -> Answer:
@@ -295,17 +287,9 @@ def _answer(
     found, counts = summary.verdict.finding, summary.counts.independent
     evidence = summary.evidence
     bad, unsure = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
-    headline, rest = _headline(summary, bad, unsure)
-    keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.passed < counts.total else []
-    below = ""
+    keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.total else []
     if evidence and bad:
         keys.append((f"{bad}/{known_alone(evidence)}", tr("entries contradicted")))
-    elif evidence and unsure:
-        settled = sum(status_of(each) == "settled" for each in evidence.entries)
-        signs = known_alone(evidence) - unsure - settled
-        below = tr(
-            "{settled} settled, {signs} but for signs, {left} to confirm.", settled=settled, signs=signs, left=unsure
-        )
     values = [stated.expected for each in disputed[:1] for stated in each.statements]
     if disputed:
         off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)
@@ -325,24 +309,24 @@ def _answer(
         fix = Fix(to_settle(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
         fix = Fix(tr("read five poses at the pendant: er3a confirm {robot} --plan", robot=robot), instead=False)
-    return Answer(headline, rest, below, keys, (), fix)
+    return replace(_headline(summary, bad, unsure), keys=keys, fix=fix)
 
 
-def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[str, str]:
+def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> Answer:
     """The verdict in two short sentences; ``bad``, ``unsure``: entries contradicted, and not confirmed."""
     status = summary.verdict.status
     if is_one(summary.verdict.finding, "validation.defined_otherwise"):
-        return tr("The same arm, defined otherwise."), tr("Correct zeros, directions, base or flange first.")
+        return Answer(tr("The same arm, defined otherwise."), tr("Correct zeros, directions, base or flange first."))
     if status == "fail":
         another = tr("Another arm's table.") if summary.is_beyond_correction else tr("This table is wrong.")
-        return another, tr("Documents contradict {count} entries.", count=bad) if bad else ""
+        return Answer(another, tr("Documents contradict {count} entries.", count=bad) if bad else "")
     if summary.conflicts:
-        return tr("Sources disagree."), tr("Measure before you rely on it.")
+        return Answer(tr("Sources disagree."), tr("Measure before you rely on it."))
     if status == "no_reference":
-        return tr("Nothing to check against."), tr("Find documents or measure.")
+        return Answer(tr("Nothing to check against."), tr("Find documents or measure."))
     if unsure and summary.evidence:
         geometry = (part for part in summary.evidence.parts if part.part == "geometry")  # as the index decides
         known = [part.settled or part.up_to_signs for part in geometry]
         first = tr("Good for planning.") if any(known) else tr("Not settled.")
-        return first, tr("Confirm {count} entries before the arm moves.", count=unsure)
-    return tr("This D-H table is right."), tr("Documents settle every entry.")
+        return Answer(first, tr("Confirm {count} entries before the arm moves.", count=unsure), good=any(known))
+    return Answer(tr("This D-H table is right."), tr("Documents settle every entry."))

@@ -14,6 +14,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.turning import Layer, Solids, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
@@ -154,7 +155,10 @@ def _smoothed(points: Reals, faces: Integers) -> Reals:
 
 
 def labelled(
-    arms: Sequence[tuple[Robot, model.WorkspaceResults]], floor_mm: float | None, contradicted: bool
+    arms: Sequence[tuple[Robot, model.WorkspaceResults]],
+    floor_mm: float | None,
+    contradicted: bool,
+    wide: float = WIDE,
 ) -> Markup:
     """Arms in what they reach, seen across axis 1, with names: reach, floor, and the voids all around axis 1. An open
     one and a tray are elsewhere: the view from above shows them.
@@ -164,6 +168,7 @@ def labelled(
     arms : what is proven of each
     floor_mm : height of the floor in the base's frame; None where there is none
     contradicted : whether the table of the last arm is: that arm is red
+    wide : width of the drawing of two arms, of its height
 
     Returns
     -------
@@ -181,7 +186,8 @@ def labelled(
         outer = np.concatenate(lines)
         far, height = outer[outer[:, 0].argmax()]
         if arms[1:]:  # words at the side say how far
-            labels.append(Label(reaches(summary), np.array([far, height]), kind))
+            said = joined([own_title(robot.title), millimetres([summary.reach_m.furthest_from_axis])], ": ")
+            labels.append(Label(with_unit(said, "mm"), np.array([far, height]), kind))
             continue
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([far / 2, below - BELOW * far]), kind, "reach"))
@@ -190,7 +196,7 @@ def labelled(
     return side_view(
         seen,
         floor_mm,
-        ratio=WIDE if arms[1:] else 1.2,
+        ratio=wide if arms[1:] else 1.2,
         labels=labels,
         column_mm=beyond(seen) if arms[1:] else None,
         over=over,
