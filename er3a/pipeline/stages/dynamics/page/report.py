@@ -36,9 +36,8 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         colour = JOINTS[j % len(JOINTS)]
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
         torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
-        seen = abs(rows.torque[:, j]).max() >= SEEN * abs(rows.torque).max()  # else it lies on the axis
-        torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}" if seen else None)
-    torque.legend(ncols=6, loc="lower left", bbox_to_anchor=(0, 1))
+        torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
+    torque.legend(ncols=6, handlelength=0.8, loc="lower left", bbox_to_anchor=(0, 1))
     torque.set_ylabel(axis_label(rows, "torque", unit))
     names = dict(
         zip(
@@ -144,7 +143,8 @@ def _worst(motors: Sequence[model.MotorNeed]) -> model.MotorNeed:
 def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     """The greatest torque that is needed, and that of each joint against its limit."""
     summary = results.summary
-    payload = payload_key(summary, robot)
+    value, meaning = payload_key(summary, robot)
+    payload = value, Markup('<a href="#payload">{}</a>').format(meaning)
     if not summary.motors:
         held = model.hardest_held(summary.holding) if summary.holding else None
         if held is None:
@@ -182,7 +182,7 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
             for title, found in (
                 (tr("Greatest torque on the paths"), rows),
                 (
-                    tr("Holding, in the worst pose found; bars to {most}", most=with_unit(f"{scale:g}", worst.unit)),
+                    tr("Holding; bars to {most}", most=with_unit(f"{scale:g}", worst.unit)),
                     still,
                 ),
             )
