@@ -171,7 +171,7 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     left = [
         tr(WITHOUT[each.reason], links=joined(each.names, " + ")) for each in summary.assumed if each.reason in WITHOUT
     ]
-    todo = tr("enter the motors' peak torques in {file}.", file=file)
+    todo = tr("enter the motors' peak torques: {file}", file=file)
     return Answer(
         headline,
         "" if limited or over else tr("Not judged: limits missing."),

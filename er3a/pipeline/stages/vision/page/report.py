@@ -48,14 +48,14 @@ ARROW_PX = 30.0
 def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> Picture:
     """Length of each sample's residual of position; one that was left out is cut off, and named."""
     size, mean, order = np.linalg.norm(rows.residual_mm, axis=1), 1.6 * found.camera_mm, np.arange(1, len(rows) + 1)
-    figure, ax = new_figure(width=SIDE, height=2.1)
+    figure, ax = new_figure(width=SIDE, height=1.9)
     ax.bar(order[rows.used], size[rows.used], color=MODEL, label=tr("used"))
     ax.bar(order[~rows.used], size[~rows.used], color=HIGHLIGHT, label=tr("left out"))
     ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("expected mean"))
     top = 1.3 * max(mean, size[rows.used].max(initial=0.0))
     for k in np.flatnonzero(size > top):
         side = "right" if 2 * k > len(rows) else "left"
-        text = tr("{name}, left out: {value}", name=rows.sample[k], value=with_unit(number(size[k], 3), "mm"))
+        text = joined([rows.sample[k], with_unit(number(size[k], 3), "mm")], ": ")
         shift = (-8 if side == "right" else 8, -4)
         ax.annotate(text, (k + 1, top), shift, textcoords="offset points", ha=side, va="top", color=HIGHLIGHT)
     ax.set_ylim(0.0, top)
