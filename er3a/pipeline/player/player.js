@@ -217,7 +217,7 @@ function tell() {
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const ends = playedUntil() < end() ? words.ends : apart ? (several ? clock.textContent + words.between : "") + words.apart.replace("{off}", apart) : motion.text;
   show(nowShown, (now[0]?.status === "plain" ? now.at(-1) : now[0])?.text || ends); // the first fault is the cause
-  nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
+  nowShown.className = `now-shown ${now[0]?.status ?? (ends === words.ends ? "pass" : "plain")}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
   const on = stretches.filter(({ dataset }) => dataset.play === motion.name && isNow({ t: Number(dataset.from), until: Number(dataset.t) }));
@@ -378,7 +378,7 @@ document.querySelector(".hero .fix a")?.addEventListener("click", (event) => {
   event.preventDefault();
   place.classList.remove("docked");
   place.scrollIntoView({ block: "nearest" });
-  play(asked.has("until") && t < playedUntil()); // or else the moment is what is to be seen
+  play((asked.has("until") || t === start()) && t < playedUntil()); // or else the moment is what is to be seen
 });
 const row = document.querySelector(".runs [aria-current][data-t]"); // of the page's list, if its address names one
 const named = decodeURIComponent(location.hash.slice(1));

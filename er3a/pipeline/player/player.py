@@ -179,7 +179,7 @@ def _corners(shape: Shape) -> Reals:
 def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, turned: float) -> dict[str, Any]:
     """How much has to be seen (m), and around which point, for the picture to hold the arms on their ways and what is
     around them, as far as that is near; ``turned``, rad: of the eye."""
-    bodies = [each for each in data["scene"] if not each.get("large") and "pale" not in each]
+    bodies = [each for each in data["scene"] if not each.get("large") and each.get("pale") is not True]
     points = [_corners(shape) for shape in bodies]
     for robot, q in zip(robots, (motion.q, *motion.beside)):
         points += [poses_at(robot, q[k])[:, :3, 3] for k in np.linspace(0, len(q) - 1, FRAMED).astype(int)]

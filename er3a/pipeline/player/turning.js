@@ -116,8 +116,8 @@ function draw() {
     space.keepClear([...Array(21).keys()].map((i) => add(scaled(from, 1 - i / 20), scaled(to, i / 20))), 0);
     space.word(text, add(scaled(from, 0.4), scaled(to, 0.6)), space.page.accent, Boolean(shown) || !space.small);
   }
-  for (const each of named) space.word(each.name, each.points?.reduce((a, b) => (dot(eyeOf(space).back, subtract(b, a)) > 0 ? b : a)) ?? placeOf(each), each === shown ? space.page.accent : space.page[each.points ? "hole" : "ink"], each === shown || !space.small); // the list has them all
-  for (const each of solids.slice(1).filter((each) => !each.address && isSeen(each))) space.names(each.parts);
+  for (const each of named) space.word(each.name, each.points?.reduce((a, b) => (dot(eyeOf(space).back, subtract(b, a)) > 0 ? b : a)) ?? placeOf(each), space.page[each.points ? "hole" : each === shown ? "accent" : "ink"]);
+  for (const each of solids.slice(1).filter((each) => !each.address && isSeen(each) && !space.small)) space.names(each.parts);
   space.end();
   place.toggleAttribute("data-drawn", true);
 }

@@ -75,7 +75,7 @@ def surroundings(robot: Robot, scene: Scene | None, ways: Sequence[Any]) -> list
     return solids
 
 
-AZIMUTH_DEG, ELEVATION_DEG = -65.0, 15.0  # from where a figure is seen at first
+AZIMUTH_DEG, ELEVATION_DEG = -52.0, 15.0  # from where a figure is seen at first
 FILLED = 0.3  # of the distance that holds the box's diagonal
 
 

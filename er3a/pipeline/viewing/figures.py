@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,6 @@ from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 from matplotlib.ticker import FixedLocator
 
-from er3a.numerics.arrays import Reals
 from er3a.pipeline import language
 from er3a.pipeline.language import tr, unit_sign
 from er3a.pipeline.messages.say import bracketed
@@ -189,13 +188,17 @@ STYLE: dict[RcKeyType, Any] = {
     "grid.color": GRID,
     "grid.linewidth": 0.7,
     "legend.frameon": False,
-    "legend.fontsize": 9,
+    "legend.fontsize": 10,
+    "legend.handlelength": 1.2,
+    "legend.columnspacing": 1.0,
+    "legend.borderaxespad": 0.1,
     "lines.linewidth": 1.6,
     "svg.fonttype": "none",
     "svg.hashsalt": "er3a",
     "xtick.color": INK,
     "ytick.color": INK,
 }
+SIDE = 3.8  # inches, of figures next to a page's picture, whose letters a phone shows as large as the page's
 _COORDINATES = re.compile(r'(?<= )(?:d|x|y)="[^"]*"')
 _DECIMALS = re.compile(r"-?\d+\.\d{2,}")
 _STYLES = re.compile(r'style="[^"]*"')
@@ -240,30 +243,6 @@ def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: floa
     """
     figure = Figure(figsize=(width, height))
     return figure, figure.subplots(rows, columns, **subplots)
-
-
-def bars(names: Sequence[str], sizes: Reals, texts: Sequence[str], colours: Sequence[str]) -> tuple[Figure, Axes]:
-    """Level bars under each other, the first on top, each with a text at its end.
-
-    Parameters
-    ----------
-    names : of the bars
-    sizes : (n,), not below 0
-
-    Returns
-    -------
-    figure, axes : the latter still without a label
-    """
-    figure, ax = new_figure(width=5.2, height=3.5)
-    places = np.arange(len(names))
-    ax.barh(places, sizes, 0.6, color=colours)
-    for place, size, text in zip(places, sizes, texts):
-        end = ax.annotate(text, (max(size, 0.0), place), (7, 0), textcoords="offset points", va="center", weight="bold")
-        end.set_bbox({"facecolor": "white", "linewidth": 0, "pad": 1})  # over a line that marks a limit
-    ax.set_yticks(places, names)
-    ax.invert_yaxis()
-    ax.margins(x=0.45)
-    return figure, ax
 
 
 def equal_scale(axes: Axes, x_label: str, y_label: str, fill: bool = True) -> None:

@@ -133,7 +133,7 @@ def _row(
         mark = "none"
     fault = fault if of_path else None
     if fault and mark == "pass":
-        note = tr("{far} mm; Paths: {verdict}", far=fixed(found.clearance_mm, 1), verdict=fault.verdict)
+        note = tr("{far} mm; fails at Paths", far=fixed(found.clearance_mm, 1))
         mark = "no_reference"
     fix = fix_of([fault]) if fault and fault.instead and mark == "fail" else None
     zero, end = np.interp([0.0, found.clearance_mm], span_mm, [0.0, 1.0])

@@ -83,13 +83,14 @@ def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> lis
     if not links:
         return []
     lever = kg @ off / kg.sum()
-    end, over = tuple(at + lever), np.array([0.0, 0.0, ABOVE_M])
+    over = np.array([0.0, 0.0, ABOVE_M])
     far, heavy = with_unit(fixed(MM * float(np.linalg.norm(lever)), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
-    tip, aside = at + lever - [0, 0, DROP_M], HEAD_M * lever / np.linalg.norm(lever)
+    under, tip = at + lever - over, at + lever - over - [0, 0, DROP_M]
+    aside = HEAD_M * lever / np.linalg.norm(lever)
     head = [Mark(0.0, 1.0, tuple(tip), tuple(tip + way - [0, 0, -HEAD_M]), "") for way in (aside, -aside)]
     sides = [Mark(0.0, 1.0, tuple(each), tuple(each + over), "") for each in (at, at + lever)]
     level = Mark(0.0, 1.0, tuple(at + over), tuple(at + lever + over), far)
-    return [level, Mark(0.0, 1.0, end, tuple(tip), heavy), *sides, *head]
+    return [level, Mark(0.0, 1.0, tuple(under), tuple(tip), heavy), *sides, *head]
 
 
 def within(value: float, tolerance: float, decimals: int = 2) -> str:

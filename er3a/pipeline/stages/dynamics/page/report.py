@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -20,33 +19,25 @@ from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, holding_text, motions, within
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, PartMark
-from er3a.pipeline.viewing.figures import axis_label, bars, new_figure
+from er3a.pipeline.viewing.figures import SIDE, axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
-TALL = 5.4  # inches, of figures at the side of the player
-KEY: dict[str, Any] = {
-    "fontsize": 10,
-    "handlelength": 1.2,
-    "columnspacing": 1.0,
-    "borderaxespad": 0.1,
-}  # above its axes
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     """Torques of all joints with their intervals, and what most of the greatest comes from."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, torque = new_figure(width=5.2, height=TALL)
+    figure, torque = new_figure(width=SIDE, height=3.9)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     for j in range(rows.torque.shape[1]):
         colour = JOINTS[j % len(JOINTS)]
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
         torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
-        seen = abs(rows.torque[:, j]).max() >= SEEN * abs(rows.torque).max()  # else it lies on the axis
-        torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}" if seen else None)
-    torque.legend(ncols=6, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
+        torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
+    torque.legend(ncols=6, handlelength=0.8, loc="lower left", bbox_to_anchor=(0, 1))
     torque.set_ylabel(axis_label(rows, "torque", unit))
     names = dict(
         zip(
@@ -60,7 +51,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     return Picture(figure, caption, caption, [(torque, path.name)])
 
 
-def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.HoldingTorque) -> Picture | None:
+def held_parts(robot: Robot, masses: model.MassesUsed | None, held: model.HoldingTorque) -> Group | None:
     """What each link adds to what a joint holds, its mass times its level distance; None where more than links hang."""
     links, _, kg, off = hanging(robot, masses, held)
     if not links:
@@ -68,15 +59,13 @@ def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.Holdi
     lever = kg @ off
     far = off @ lever / np.linalg.norm(lever)
     torques = abs(held.torque) * kg * far / (kg @ far)
-    levers = (f"{with_unit(number(m, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}" for m, way in zip(kg, far))
-    numbered = (tr("link {number}", number=each.link) for each in links)
-    names = ["\n".join(each) for each in zip(numbered, levers)]
-    texts = [with_unit(fixed(each, 1), held.unit) for each in torques]
-    figure, ax = bars(names, torques, texts, [JOINTS[each.link - 1] for each in links])
-    figure.set_figheight(TALL)
-    ax.set_xlabel(axis_label(model.TorqueRows, "torque", held.unit))
-    caption = tr("Link mass × level distance to J{joint}.", joint=held.joint)
-    return Picture(figure, caption, caption)
+    rows = []
+    for each, torque, mass, way in zip(links, torques, kg, far):
+        name = joined([tr("link {number}", number=each.link), with_unit(fixed(torque, 1), held.unit)], ": ")
+        note = f"{with_unit(number(mass, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}"
+        part = Part(0.0, max(0.0, torque / torques.max()), "none", JOINTS[held.joint - 1])
+        rows.append(ListRow("none", name, note, length=1.0, parts=[part]))
+    return Group(tr("Link mass × level distance to J{joint}.", joint=held.joint), rows, counted=False)
 
 
 MAX_USES = 12
@@ -96,9 +85,6 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         for path in summary.paths
         if path.complete
     ]
-    for each in summary.holding:
-        if drawn := held_figure(robot, summary.masses, each):
-            figures.append((holding_name(each.joint), drawn))
     render_stage(
         study,
         stored,
@@ -115,6 +101,11 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         not_run=joined((path.name for path in summary.paths if not path.counts), ", "),
         margins=any(path.payload or path.speed_scale for path in summary.paths),
         figures=figures,
+        parts=[
+            (holding_name(each.joint), own)
+            for each in summary.holding
+            if (own := held_parts(robot, summary.masses, each))
+        ],
         player=player(
             robot,
             [*motions(robot, results), *held(robot, results)] or [at_rest(robot, own_title(robot.title))],
@@ -152,7 +143,8 @@ def _worst(motors: Sequence[model.MotorNeed]) -> model.MotorNeed:
 def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     """The greatest torque that is needed, and that of each joint against its limit."""
     summary = results.summary
-    payload = payload_key(summary, robot)
+    value, meaning = payload_key(summary, robot)
+    payload = value, Markup('<a href="#payload">{}</a>').format(meaning)
     if not summary.motors:
         held = model.hardest_held(summary.holding) if summary.holding else None
         if held is None:
@@ -180,18 +172,18 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     left = [
         tr(WITHOUT[each.reason], links=joined(each.names, " + ")) for each in summary.assumed if each.reason in WITHOUT
     ]
-    todo = tr("enter the motors' peak torques in {file}.", file=file)
+    todo = tr("enter the motors' peak torques: {file}", file=file)
     return Answer(
         headline,
-        "" if limited or over else tr("Motor limits are missing."),
+        "" if limited or over else tr("Not judged: limits missing."),
         tr("± from the masses. Not included: {parts}.", parts=joined(left, ", ")) if left else "",
         [payload],
         [
-            Group(title, [row for row in found if row.parts[0].end >= SEEN])
+            Group(title, [row for row in found if row.parts[0].end >= SEEN], counted=False)
             for title, found in (
                 (tr("Greatest torque on the paths"), rows),
                 (
-                    tr("Holding, in the worst pose found; bars to {most}", most=with_unit(f"{scale:g}", worst.unit)),
+                    tr("Holding; bars to {most}", most=with_unit(f"{scale:g}", worst.unit)),
                     still,
                 ),
             )

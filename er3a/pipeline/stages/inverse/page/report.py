@@ -31,6 +31,7 @@ from er3a.pipeline.stages.trajectory.page.report import both_arms
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
 from er3a.pipeline.viewing.page import panel_address, panel_link, render_stage
+from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -61,6 +62,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         **shown,
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
+        colours=JOINTS,
         sections=[_section(robot, target, of_target(target)) for target in chosen],
         sliding=_sliding(robot),
         count=len(results.targets),
@@ -88,6 +90,9 @@ def _answer(targets: model.TargetRows, shown: Sequence[model.TargetResult]) -> A
     headline = tr("{count} of {due} poses reached.", count=targets.reached.sum(), due=len(targets) - caught)
     clear = targets.clearance_mm[np.isfinite(targets.clearance_mm)]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if len(clear) else []
+    if solved := sum(each.solutions for each in shown):
+        usable = sum(each.within_limits for each in shown)
+        keys.append((f"{usable}/{solved}", tr("within the limits")))
     rows = [_row(each) for each in shown]
     return Answer(
         headline,
@@ -168,16 +173,10 @@ def _solutions_listed(
             instead if branches.refusal[k] else _jogged(branches.q_deg[k]),
             moment(target.name, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
             shares[k].clip(-OVER, 1 + OVER).tolist(),
-            _outcome(branches, k, _move(branches, k)),
+            _outcome(branches, k, with_unit(fixed(branches.greatest_move_deg[k], 0), "deg")),
         )
         for k in range(len(branches))
     ]
-
-
-def _move(branches: model.SolutionRows, k: int) -> str:
-    """How far the joint turns that turns farthest, and whether the solution is the one chosen."""
-    far = with_unit(fixed(branches.greatest_move_deg[k], 0), "deg")
-    return joined([far, tr("chosen") if branches.rank[k] == 1 else ""], ", ")
 
 
 def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:

@@ -12,11 +12,10 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
-from er3a.pipeline.viewing.figures import axis_label, new_figure
+from er3a.pipeline.viewing.figures import SIDE, axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture
 
 WIDTHS = 3.2, 0.83  # of the first curve, and of each in parts of the one before, so that those that coincide all show
-KEY: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.1, "handlelength": 1.2}
 OFF = 0.005  # mm or deg, from which on a repair counts as off the path
 
 
@@ -35,7 +34,7 @@ def path_picture(path: model.PathSummary, rows: model.PathChecks, caption: str) 
         _mark(ax, path)
         ax.set_ylabel(axis_label(rows, name))
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
-    axes[0].legend(ncols=10, loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0.1)
+    axes[0].legend(ncols=10, loc="lower left", bbox_to_anchor=(0, 1))
     axes[1].set_xlabel(axis_label(rows, "t_s"))
     return Picture(figure, caption, caption, [(ax, path.name) for ax in axes])
 
@@ -55,7 +54,7 @@ def nearness_picture(
     shapes : the assumed ones, which may be wrong by their margin; None where none are assumed
     path : whose faults are marked; None of a motion that repairs them
     """
-    figure, ax = new_figure(width=5.2, height=3.0)
+    figure, ax = new_figure(width=SIDE, height=2.0)
     ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
     if path:
         _mark(ax, path)
@@ -84,7 +83,7 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
     rows : of the path, or of the avoidance strategy that repairs it
     before : of the path, if the motion repairs it
     """
-    figure, ax = new_figure(width=5.2, height=3.0)
+    figure, ax = new_figure(width=SIDE, height=2.0)
     fast = path.too_fast and path.verdict != "singular" and not path.of("unreachable")
     edge = before is None and path.of("unreachable") and any(each.type == "elbow" for each in path.singularities)
     column, label, title = "smallest_singular_value", tr("smallest singular value"), tr("Distance from singular poses")
@@ -122,7 +121,7 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
 def _key(ax: Axes) -> None:
     """Name what is drawn, if anything has a name."""
     if ax.get_legend_handles_labels()[1]:
-        ax.legend(ncols=2, **KEY)
+        ax.legend(ncols=2, loc="lower right", bbox_to_anchor=(1, 1))
 
 
 def _mark(ax: Axes, path: model.PathSummary) -> None:

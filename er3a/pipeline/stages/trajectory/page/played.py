@@ -320,7 +320,7 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
         PlayedEvent(
             s.t0_s,
             s.t1_s,
-            tr("{fault}: {cause}", fault=kind, cause=_few_words(s)),
+            tr("{fault}: {cause}, at {t:.2f} s", fault=kind, cause=_few_words(s), t=s.t0_s),
             _weight(s),
             _touching(s.cause),
             _joints(s.cause),

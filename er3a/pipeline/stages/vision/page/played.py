@@ -18,7 +18,7 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.vision.model import CIRCLES_MM, ObjectResult, PoseEstimate, VisionResults, VisionSummary
 from er3a.pipeline.viewing.drawn import Shape, frame_between
-from er3a.pipeline.viewing.palette import INK, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.palette import REFERENCE, VERDICTS
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -139,5 +139,5 @@ def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:
 
 
 def _object(each: ObjectResult, kind: str) -> Shape:
-    colour, T = VERDICTS["pass"] if each.grasp else INK, placed(each).tolist()  # not red: what it touches is
+    colour, T = VERDICTS["pass" if each.grasp else "fail"], placed(each).tolist()
     return {"frame": 0, "name": each.name, "kind": kind, "T": T, "colour": colour, "size": OBJECT_M, **ROUND_M}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -32,7 +32,7 @@ from er3a.pipeline.stages.vision.page.played import (
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
-from er3a.pipeline.viewing.figures import new_figure
+from er3a.pipeline.viewing.figures import SIDE, new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
     panel_link,
@@ -46,27 +46,23 @@ ARROW_PX = 30.0
 
 
 def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> Picture:
-    """Length of each sample's residual, position above, rotation below; one that was left out is cut off, and named."""
-    sizes = np.linalg.norm(rows.residual_mm, axis=1), np.linalg.norm(rows.residual_deg, axis=1)
-    usual = [1.6 * found.camera_mm, 1.6 * found.camera_deg]
-    figure, axes = new_figure(2, 1, 5.2, 5.1, sharex=True)
-    names = (tr("position (mm)"), tr("rotation (°)"))
-    for ax, size, mean, unit, label in zip(axes, sizes, usual, ("mm", "deg"), names):
-        order = np.arange(1, len(rows) + 1)
-        ax.bar(order[rows.used], size[rows.used], color=MODEL, label=tr("used"))
-        ax.bar(order[~rows.used], size[~rows.used], color=HIGHLIGHT, label=tr("left out"))
-        ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("expected mean"))
-        top = 1.3 * max(mean, size[rows.used].max(initial=0.0))
-        for k in np.flatnonzero(size > top):
-            side = "right" if 2 * k > len(rows) else "left"
-            text = tr("{name}, left out: {value}", name=rows.sample[k], value=with_unit(number(size[k], 3), unit))
-            shift = (-8 if side == "right" else 8, -4)
-            ax.annotate(text, (k + 1, top), shift, textcoords="offset points", ha=side, va="top", color=HIGHLIGHT)
-        ax.set_ylim(0.0, top)
-        ax.set_ylabel(label)
-        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes[1].set_xlabel(tr("sample"))
-    axes[0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    """Length of each sample's residual of position; one that was left out is cut off, and named."""
+    size, mean, order = np.linalg.norm(rows.residual_mm, axis=1), 1.6 * found.camera_mm, np.arange(1, len(rows) + 1)
+    figure, ax = new_figure(width=SIDE, height=1.9)
+    ax.bar(order[rows.used], size[rows.used], color=MODEL, label=tr("used"))
+    ax.bar(order[~rows.used], size[~rows.used], color=HIGHLIGHT, label=tr("left out"))
+    ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("expected mean"))
+    top = 1.3 * max(mean, size[rows.used].max(initial=0.0))
+    for k in np.flatnonzero(size > top):
+        side = "right" if 2 * k > len(rows) else "left"
+        text = joined([rows.sample[k], with_unit(number(size[k], 3), "mm")], ": ")
+        shift = (-8 if side == "right" else 8, -4)
+        ax.annotate(text, (k + 1, top), shift, textcoords="offset points", ha=side, va="top", color=HIGHLIGHT)
+    ax.set_ylim(0.0, top)
+    ax.set_ylabel(tr("position (mm)"))
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_xlabel(tr("sample"))
+    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     caption = tr("Residual of each sample.")
     return Picture(figure, caption, caption)
 
@@ -114,26 +110,35 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
 
 
-def _errors(each: model.ObjectResult, limit: float) -> dict[str, Any]:
+def _least_sure(objects: Iterable[model.ObjectResult]) -> model.ObjectResult | None:
+    """The object whose grasp succeeds least often; None where nothing is grasped."""
+    sure = [(each.grasp.probability, k, each) for k, each in enumerate(objects) if each.grasp and each.error_mm]
+    return min(sure)[2] if sure else None
+
+
+def _errors(each: model.ObjectResult | None, task: VisionFile) -> list[Group]:
     """By how much the tool misses an object, and by what cause: bars to one scale, with the gripper's tolerance."""
-    mm, deg, rows = each.error_mm, each.error_deg, list[ListRow]()
-    if mm and deg:
-        for part, cause in PARTS.items():
-            off, scale = getattr(mm, part), 1.1 * max(limit, mm.together)
-            mark: Literal["pass", "fail", "none"] = "none" if rows else "pass" if off <= limit else "fail"
-            text = f"{fixed(off, 2)} mm, {fixed(getattr(deg, part), 2)}°"
-            parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
-            rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
-    title = tr("{name}: error, 95 % │ tolerance {limit} mm", name=each.name, limit=f"{limit:g}")
-    if not rows:
-        title, rows = each.name, [ListRow("none", refusal_text(each), "")]
-    return {"of": each.name, "title": title, "rows": rows, "counted": False}
+    if each is None or not each.error_mm:
+        return []
+    limit, turn = min(task.gripper.tolerance_mm), min(task.gripper.tolerance_deg)
+    mm, rows = each.error_mm, list[ListRow]()
+    scale = 1.1 * max(limit, mm.together)
+    for part, cause in PARTS.items():
+        off = getattr(mm, part)
+        mark: Literal["pass", "fail", "none"] = "none" if rows else "pass" if off <= limit else "fail"
+        text = f"{fixed(off, 2)} mm, {fixed(getattr(each.error_deg, part), 2)}°"
+        parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
+        rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
+    allowed = [Part(limit / scale, 1.0, "rest")]
+    rows.append(ListRow("none", tr("tolerance"), f"{limit:g} mm, {turn:g}°", length=1.0, parts=allowed))
+    title = tr("{name}: error, 95 % of grasps", name=each.name)
+    return [Group(title, rows, counted=False)]
 
 
 RESIDUALS = "#figure-residuals"
 AXES = ("x", "y", "z")
 PARTS = {
-    "together": N_("error, all together"),
+    "together": N_("all together"),
     "camera": N_("camera's noise"),
     "table": N_("D-H table"),
     "calibration": N_("calibration"),
@@ -155,7 +160,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         stored,
         output,
         answer,
-        errors=[_errors(each, min(task.gripper.tolerance_mm)) for each in summary.objects],
+        errors=_errors(_least_sure(summary.objects), task),
         found=found,
         file=file,
         poses=[*zip(pose_words(found.setup), map(_pose_rows, (found.hand_eye, found.board)))] if found else [],
@@ -185,25 +190,23 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     headline = tr("{count} of {all} objects can be grasped.", count=len(grasped), all=len(objects) - caught)
     if not objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
-    keys, limit = [], min(task.gripper.tolerance_mm)
-    sure = [(each.grasp.probability, each.error_mm, each.name) for each in grasped if each.grasp and each.error_mm]
-    if sure:
-        least, error, name = min(sure, key=lambda each: each[0])
+    keys, limit = list[tuple[str, str]](), min(task.gripper.tolerance_mm)
+    least = _least_sure(objects)
+    if least and least.grasp and least.error_mm:
         allowed = tr("{limit} allowed", limit=with_unit(f"{limit:g}", "mm"))
         made = joined([allowed, tr("simulated") if found and found.simulated else ""], ", ")
         keys = [
-            (f"{fixed(100 * least, 1)} %", tr("least success: {name}", name=name)),
-            (tr("{far} off", far=with_unit(fixed(error.together, 1), "mm")), made),
+            (f"{fixed(100 * least.grasp.probability, 1)} %", tr("least success: {name}", name=least.name)),
+            (tr("{far} off", far=with_unit(fixed(least.error_mm.together, 1), "mm")), made),
         ]
     elif found:
         half = fixed(max(found.hand_eye.half_width_mm), 2)
         place = f"{_listed(found.hand_eye.xyz_mm, 0)} ± {half}"
         keys = [(with_unit(place, "mm"), tr("camera's place, 95 %"))]
-    if found and found.suspects and objects:
-        keys.insert(0, (f"{found.used}/{found.samples}", tr("samples used")))
     gaps = {gap.reason for check in summary.verdict.missed for gap in check.gaps}
     fix = Fix(tr("describe the gripper: {file}", file=scene), "#carried", False) if "gripper" in gaps else None
-    shown = [_row(each, grasp_moment(results, each), fix) for each in objects]
+    ordered = sorted(objects, key=lambda each: each.grasp.probability if each.grasp else 0.0)
+    shown = [_row(each, grasp_moment(results, each), fix) for each in ordered]
     refused = [row for row in shown if row.mark == "fail"]
     groups = [
         Group(

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
-from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.numbers import at_least, at_most, fixed
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
@@ -46,7 +46,9 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     if instead and (right := found_by(stored, "workspace", f"../{instead}")):
         arms.insert(0, (study.robot(instead), right.results))
         far, wrong = (fixed(1000 * each.summary.reach_m.furthest_from_axis, 0) for _, each in arms)
-        answer = Answer("", tr("The flange reaches {far}, not {wrong} mm.", far=far, wrong=wrong))
+        volumes = joined((fixed(each.summary.volume_m3.middle, 2) for _, each in reversed(arms)), " → ")
+        keys = [(volumes, tr("Reached volume, proven (m³)"))]
+        answer = Answer("", tr("The flange reaches {far}, not {wrong} mm.", far=far, wrong=wrong), keys=keys)
     render_stage(
         study,
         stored,
@@ -79,29 +81,26 @@ def _answer(
     # The void that the picture shows comes first.
     in_order = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     volume, voids = summary.volume_m3, [_void_as_row(*each) for each in in_order]
-    rest, fix = "", None
+    said, fix = [whole_sentence(reaches(summary))], None
     if placing and rows[0].mark == "pass":
-        tray = placing.tray
-        centre = millimetres(tray.place.centre_m)
-        rest = whole_sentence(tr("{tray} fits", tray=tray.name))
-        fix = Fix(tr("add the tray and its stand to the scene at {centre} mm.", centre=centre), "#tray-1", False)
+        said.append(placing.tray.place_text)
+        fix = Fix(tr("add the tray and its stand to the scene."), "#tray-1", False)
     keys = [
-        *((about(void), if_normal(void, row.name)) for (_, void), row in zip(in_order[:1], voids)),
         (
             with_unit(fixed(volume.middle, 2), "m³"),
-            tr("± {half} m³, proven", half=fixed(volume.upper - volume.middle, 2)),
+            tr("{low} to {high} m³, proven", low=at_least(volume.lower, "m³"), high=at_most(volume.upper, "m³")),
         ),
         payload,
     ]
     groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
-    return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups, fix)
+    return Answer(joined(said, " "), "", tr("Distances are from axis 1."), keys, groups, fix)
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: which one, how large."""
-    note, limits = if_normal(void, with_unit(workspace_figures.litres(void), "L")), void.cause.params.get("limits", ())
+    note, limits = if_normal(void, about(void)), void.cause.params.get("limits", ())
     if [each.joints for each in limits] == [(1,), (1,)] and limits[0].limit == -limits[1].limit:
-        note = tr("behind the arm: J1 stops at ±{deg:g}°", deg=abs(limits[0].limit))
+        note = tr("{size}: J1 stops at ±{deg:g}°", size=note, deg=abs(limits[0].limit))
     return ListRow("none", workspace_figures.void_name(number_, void), note, f"#hole-{number_}")
 
 
@@ -112,8 +111,7 @@ def _tray_as_rows(placing: Placing | None, settled: bool) -> list[ListRow]:
     rows = []
     for number_, tried in enumerate(placing.tried, start=1):
         blocked = sum(map(len, placing.hindered(tried).values()))
-        centre = millimetres(tried.tray.place.centre_m)
-        note = tr("{centre} mm; blocks {count}/{all} motions", centre=centre, count=blocked, all=placing.passing)
+        note = tr("blocks {count} of {all} motions", count=blocked, all=placing.passing)
         rows.append(
             ListRow("pass" if settled and not blocked else "caution", tried.tray.name, note, f"#tray-{number_}")
         )

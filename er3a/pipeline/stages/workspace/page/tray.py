@@ -33,6 +33,7 @@ from er3a.pipeline.stages.trajectory.page.played import repaired
 from er3a.pipeline.stages.vision.model import ObjectResult, VisionResults
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary, TaskSummary
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.page import whole_sentence
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -79,6 +80,14 @@ class Tray:
     def name(self) -> str:
         """The surface that it is on or over, in few words."""
         return tr("tray over {name}", name=own_title(self.below.name)) if self.below else tr("tray")
+
+    @property
+    def place_text(self) -> str:
+        """Its centre seen from above, and how high its stand is, or else what it is on."""
+        if self.floor is None:
+            return whole_sentence(self.where)
+        x, y, gap = (millimetres([each]) for each in (*self.place.centre_m[:2], self.low[2] - self.floor))
+        return tr("Tray: x {x}, y {y}, stand {gap} mm.", x=x, y=y, gap=gap)
 
     @property
     def where(self) -> str:

@@ -119,13 +119,14 @@ def _reaching_in(robot: Robot, tray: Tray) -> list[Reals]:
 
 
 def _ways(tray: Tray) -> list[tuple[list[float], list[float], str]]:
-    """From the origin to the middle of a tray: along x and y, then up in front of the stand."""
-    steps = np.diag(tray.place.centre_m)
-    starts = np.cumsum([0 * AHEAD, *steps[:2]], axis=0)
-    starts[2] += tray.place.size_m[0] / 2 * AHEAD
+    """From the origin to below the middle of a tray along x and y, then up its stand, or else to its middle."""
+    x, y, high = tray.place.centre_m
+    low = 0.0 if tray.floor is None else tray.floor
+    steps = np.diag([x, y, (high if tray.floor is None else tray.low[2]) - low])
+    starts = np.array([(0.0, 0.0, 0.0), (x, 0.0, 0.0), (x + tray.place.size_m[0] / 2, y, low)])
     return [
-        (start.tolist(), (start + step).tolist(), f"{axis} {with_unit(millimetres([step.sum()]), 'mm')}")
-        for start, step, axis in zip(starts, steps, "xyz")
+        (start.tolist(), (start + step).tolist(), axis + with_unit(millimetres([step.sum()]), "mm"))
+        for start, step, axis in zip(starts, steps, ("x ", "y ", ""))
         if step.any()
     ]
 
