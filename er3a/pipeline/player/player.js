@@ -217,7 +217,7 @@ function tell() {
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const ends = playedUntil() < end() ? words.ends : apart ? (several ? clock.textContent + words.between : "") + words.apart.replace("{off}", apart) : motion.text;
   show(nowShown, (now[0]?.status === "plain" ? now.at(-1) : now[0])?.text || ends); // the first fault is the cause
-  nowShown.className = `now-shown ${now[0]?.status ?? (ends === words.ends ? "pass" : "plain")}`;
+  nowShown.className = `now-shown ${playedUntil() < end() && (now[0]?.status ?? "plain") === "plain" ? "pass" : (now[0]?.status ?? "plain")}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
   const on = stretches.filter(({ dataset }) => dataset.play === motion.name && isNow({ t: Number(dataset.from), until: Number(dataset.t) }));
