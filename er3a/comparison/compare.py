@@ -47,7 +47,8 @@ Uncompared = Literal[
 ]
 Columns = dict[str, Reals | str]
 ALIGN_POSES, ALIGNED, STEPS = 100, 30, {"maxiter": 5}  # of the first round; rounds, and steps in each
-SAME_FOUND = 1 + 2e-4  # of the worst distance in an alignment, when a search ends
+SAME_FOUND = 1 + 5e-4  # of the worst distance in an alignment, when a search ends
+SLOPE_STEP = 1e-7  # m, rad, between alignments of which a slope is the difference
 NEAR_WORST = 0.8  # of it, from which on a pose is kept
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
 NO_TURN, HALF_TURN = 1e-9, np.pi - 1e-4  # rad, below and above which an axis has no sense
@@ -537,17 +538,28 @@ def _aligned(
     x, least, bound = np.zeros(8 + a.rows), np.inf, NO_OFFSET
 
     def moved(x: Reals) -> Alignment:
-        """Turned (rad) and shifted (m) at the base, shifted at the flange, with other zeros after the first."""
-        base = posed(exp_rotation(x[:3]), x[3:6]) @ start.base
-        return Alignment(base, start.flange @ translation(*x[6:9]), start.zeros + np.r_[0, x[9:]], start.signs)
+        """Turned (rad) and shifted (m) at the base, shifted at the flange, with other zeros after the first; (..., p)."""
+        base, flange = posed(exp_rotation(x[..., :3]), x[..., 3:6]), posed(exp_rotation(0 * x[..., :3]), x[..., 6:9])
+        zeros = start.zeros + np.concatenate([0 * x[..., :1], x[..., 9:]], axis=-1)
+        return Alignment(base @ start.base, start.flange @ flange, zeros, start.signs)
 
     def flanges(by: Alignment, poses: Reals) -> tuple[Reals, Reals]:
+        """A's flanges (k, 4, 4), and those of B as one alignment or several of them, (..., k, 4, 4), bring them."""
         u = row_values(a, poses)
-        there = forward_of_rows(b, by.signs * (u - by.zeros * a.direction))
-        return forward_of_rows(a, u), by.base @ there @ np.linalg.inv(by.flange)
+        rows = by.signs * (u - (by.zeros * a.direction)[..., None, :])
+        there = forward_of_rows(b, rows.reshape(-1, b.rows)).reshape(*rows.shape[:-1], 4, 4)
+        return forward_of_rows(a, u), by.base[..., None, :, :] @ there @ np.linalg.inv(by.flange)[..., None, :, :]
 
     def now(poses: Reals) -> tuple[Reals, Reals]:
         return flanges(moved(x), poses)
+
+    def room(y: Reals) -> Reals:
+        """By how much the distance at each pose is below the bound, the last of y (..., p + 1)."""
+        return y[..., -1:] - shift_between(*flanges(moved(y[..., :-1]), q))
+
+    def slopes(y: Reals) -> Reals:
+        there, *near = room(np.vstack([y, y + SLOPE_STEP * np.eye(len(y))]))
+        return np.transpose(near - there) / SLOPE_STEP
 
     for _ in range(1 if same else ALIGNED):
         off, ends = worst_poses(shift_between, now, a)
@@ -556,7 +568,7 @@ def _aligned(
         if least <= bound * SAME_FOUND:
             break
         q = np.r_[q, ends]
-        nearer = {"type": "ineq", "fun": lambda y, q=q: y[-1] - shift_between(*flanges(moved(y[:-1]), q))}
+        nearer = {"type": "ineq", "fun": room, "jac": slopes}
         y = scipy.optimize.minimize(lambda y: y[-1], np.r_[x, off[0]], constraints=nearer, options=STEPS).x.round(SHOWN)
         x, bound = y[:-1], y[-1]
         q = q[shift_between(*now(q)) > NEAR_WORST * bound]
@@ -573,13 +585,13 @@ def shift_between(one: Reals, other: Reals) -> Reals:
 
     Parameters
     ----------
-    one, other : (k, 4, 4), m
+    one, other : (..., k, 4, 4), m
 
     Returns
     -------
-    shift : (k,), m
+    shift : (..., k), m
     """
-    shift: Reals = np.linalg.norm(one[:, :3, 3] - other[:, :3, 3], axis=1)
+    shift: Reals = np.linalg.norm(one[..., :3, 3] - other[..., :3, 3], axis=-1)
     return shift
 
 
