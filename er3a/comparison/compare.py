@@ -37,7 +37,7 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
 from er3a.numerics.arrays import Reals
-from er3a.numerics.peaks import box_points, peak
+from er3a.numerics.peaks import PEAK_STEPS, box_points, peak
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import CombinedLimit, Robot, Source
 
@@ -47,6 +47,7 @@ Uncompared = Literal[
 ]
 Columns = dict[str, Reals | str]
 ALIGN_POSES, ALIGNED, STEPS = 100, 30, {"maxiter": 5}  # of the first round; rounds, and steps in each
+CLIMB = 10  # steps to a worst pose in each round
 SAME_FOUND = 1 + 5e-4  # of the worst distance in an alignment, when a search ends
 SLOPE_STEP = 1e-7  # m, rad, between alignments of which a slope is the difference
 NEAR_WORST = 0.8  # of it, from which on a pose is kept
@@ -561,14 +562,14 @@ def _aligned(
         there, *near = room(np.vstack([y, y + SLOPE_STEP * np.eye(len(y))]))
         return np.transpose(near - there) / SLOPE_STEP
 
+    nearer = {"type": "ineq", "fun": room, "jac": slopes}
     for _ in range(1 if same else ALIGNED):
-        off, ends = worst_poses(shift_between, now, a)
+        off, ends = worst_poses(shift_between, now, a, PEAK_STEPS if same else CLIMB)
         if off[0] < least:
             best, least = moved(x), off[0]
         if least <= bound * SAME_FOUND:
             break
         q = np.r_[q, ends]
-        nearer = {"type": "ineq", "fun": room, "jac": slopes}
         y = scipy.optimize.minimize(lambda y: y[-1], np.r_[x, off[0]], constraints=nearer, options=STEPS).x.round(SHOWN)
         x, bound = y[:-1], y[-1]
         q = q[shift_between(*now(q)) > NEAR_WORST * bound]
@@ -610,7 +611,10 @@ def turn_between(one: Reals, other: Reals) -> Reals:
 
 
 def worst_poses(
-    off: Callable[[Reals, Reals], Reals], flanges: Callable[[Reals], tuple[Reals, Reals]], robot: Robot
+    off: Callable[[Reals, Reals], Reals],
+    flanges: Callable[[Reals], tuple[Reals, Reals]],
+    robot: Robot,
+    steps: int = PEAK_STEPS,
 ) -> tuple[list[float], Reals]:
     """Where two flanges are most off over an arm's joint ranges, as far as :func:`peak` finds it.
 
@@ -619,6 +623,7 @@ def worst_poses(
     off : of poses (k, 4, 4) of both, what is sought (k,)
     flanges : the two at joint values (k, n)
     robot : whose ranges count
+    steps : of each climb, at most
 
     Returns
     -------
@@ -626,7 +631,7 @@ def worst_poses(
     q : (k, n), rad or m, where they were found
     """
     lower, upper = np.sort([robot.lower, robot.upper], axis=0)
-    q, largest = peak(lambda q: off(*flanges(q)), lower, upper, box_points(lower, upper))
+    q, largest = peak(lambda q: off(*flanges(q)), lower, upper, box_points(lower, upper), steps=steps)
     return largest.tolist(), q
 
 
