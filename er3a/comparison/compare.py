@@ -539,7 +539,7 @@ def _aligned(
     x, least, bound = np.zeros(8 + a.rows), np.inf, NO_OFFSET
 
     def moved(x: Reals) -> Alignment:
-        """Turned (rad) and shifted (m) at the base, shifted at the flange, with other zeros after the first; (..., p)."""
+        """Turned (rad) and shifted (m) at the base, shifted at the flange, other zeros after the first; x (..., p)."""
         base, flange = posed(exp_rotation(x[..., :3]), x[..., 3:6]), posed(exp_rotation(0 * x[..., :3]), x[..., 6:9])
         zeros = start.zeros + np.concatenate([0 * x[..., :1], x[..., 9:]], axis=-1)
         return Alignment(base @ start.base, start.flange @ flange, zeros, start.signs)

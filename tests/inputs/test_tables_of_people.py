@@ -678,7 +678,7 @@ IN_MATLAB = "DH = [0 0.29 0 -pi/2 0 0;\n 0 0 0.27 0 0 -pi/2];\n"
         f"{LISTS}links = []\nfor i in range(2):\n    one = RevoluteDH(d=d[i], a=a[i], alpha=alpha[i],\n"
         "                     offset=off[i])\n    links.append(one)\n",
         f"{LISTS}L = [RevoluteDH(d=x, a=y, alpha=z, offset=w) for x, y, z, w in zip(d, a, alpha, off)]\n",
-        f"{MATRIX}for (const auto& r : DH) {{\n    L.push_back(RevoluteDH(d=r[1], a=r[2], alpha=r[3], offset=r[0]));\n}}\n",
+        f"{MATRIX}for (const auto& r : DH) {{\n    L.add(RevoluteDH(d=r[1], a=r[2], alpha=r[3], offset=r[0]));\n}}\n",
         f"{MATRIX}for (const r of DH) {{\n    L.push(RevoluteDH(d=r[1], a=r[2], alpha=r[3], offset=r[0]));\n}}\n",
         f"{RECORDS}for p in dh:\n    L.append(RevoluteDH(d=p['d'], a=p['a'], alpha=p['alpha'], offset=p['theta']))\n",
         f"{MATRIX}for i in range(len(DH)):\n    theta, d, a, alpha = DH[i]\n"
