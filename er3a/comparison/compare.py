@@ -572,7 +572,7 @@ def _aligned(
         q = np.r_[q, ends]
         y = scipy.optimize.minimize(lambda y: y[-1], np.r_[x, off[0]], constraints=nearer, options=STEPS).x.round(SHOWN)
         x, bound = y[:-1], y[-1]
-        q = q[shift_between(*now(q)) > NEAR_WORST * bound]
+        q = q[room(y) < (1 - NEAR_WORST) * bound]
     one, other = (each[:, :3, :3] for each in flanges(best, q))
     turn = nearest_rotations(np.einsum("kjl,kji->li", one, other))
     best = replace(best, flange=posed(turn, np.zeros(3)) @ best.flange)

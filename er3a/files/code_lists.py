@@ -202,18 +202,15 @@ def _header(line: str) -> tuple[Words, str]:
     ``(int i = 0; i < 6; i++) {``, ``(const auto& row : rows) {``, ``(const row of rows) {`` or ``i = 1:n``."""
     mark = next((each for each in (" in ", " of ", "=", ":") if each in line), "=")
     names, _, over = line.partition(mark)
-    over = over.strip(" :{")
-    if over.count(")") > over.count("("):
-        over = over.removesuffix(")")
     words = [re.findall(r"\w+", part) for part in names.split(",")]
-    return [part[-1] for part in words if part], over  # its type is before a name
+    return [part[-1] for part in words if part], over.strip(" :{")  # its type is before a name
 
 
 def _numbers(over: str) -> tuple[int, str, bool] | None:
     """The first number of a loop, its end as it is written, and whether that is one, too; None of other loops."""
     if over.startswith("range("):
         first, _, end = over[6:-1].rpartition(",")
-    elif ";" in over:
+    elif ";" in over and "+=" not in over:
         first, condition, *_ = over.split(";")
         end = condition.partition("<")[2]
     else:
@@ -267,13 +264,13 @@ class Lists:
         numbers = _numbers(over)
         lists = [] if numbers else [name for name in re.findall(r"\w+", over) if name in counts]
         every = min([counts[name] for name in lists or re.findall(r"\w+", text) if name in counts], default=0)
-        first, last = 0, every if re.match(r"enumerate\(|zip\(|[\w.]+$", over) else 0
+        first, last = 0, every if re.match(r"enumerate\(|zip\(|[\w.]+\)?$", over) else 0
         if numbers:
             first, end, closed = numbers
             known = counts | {name: int(value) for name, value in PART.findall(self.code.text) if value.isdigit()}
             ends = [known[name] for name in re.findall(r"\w+", end) if name in known]  # n, or len(rows)
             last = int(end) if end.isdigit() else ends[0] if ends else first + every - closed
-            last = first if re.search(r"[-+*/]", end) else last + closed
+            last = first if re.search(r"[-+*/:]", end) else last + closed
         for k in range(first, min(last, MOST_PASSES)):
             found = [str(k)] * ("enumerate(" in over or not lists) + [f"{name}@{k}" for name in lists]
             rest = [f"{found[-1]}@{part}" for part in range(len(names) - len(found) + 1)]

@@ -29,7 +29,7 @@ from er3a.files.table_code import code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
-from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
+from er3a.robots.robot import CONVENTIONS, Convention
 
 FIXED = "fixed", "tool"
 NEEDED = frozenset({"a", "alpha", "d"})
@@ -136,28 +136,6 @@ class PrintedTable:
 MAX_BYTES = 200_000
 LONGEST_IN_M = 2.5  # a link of a robot; the same number of mm is none
 RIGHT_WITHIN = 1e-3  # rad and deg: right angles as printed with three decimals or more
-MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
-
-
-def check_size(path: Path, lines: Lines) -> None:
-    """Refuse more rows than any arm has.
-
-    Parameters
-    ----------
-    lines : the header and the rows
-
-    Raises
-    ------
-    InputError
-        with the number of rows
-    """
-    if len(lines) > MOST_LINES:
-        raise InputError(
-            path,
-            None,
-            f"{len(lines) - 1:,} rows are no arm's table",
-            f"er3a models 1 to {MAX_JOINTS} joints: write one row for each",
-        )
 
 
 def table_text(path: Path) -> str:

@@ -795,6 +795,8 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
     ("text", "names"),
     [
         (f"{LINES}L = []\nfor i in range(1):\n    L.append({LINK})\n", "of a loop"),
+        (f"{LINES}for i = 1:2:2\n  L(i) = Revolute('d', d(i), 'a', a(i), 'alpha', alpha(i));\nend\n", "of a loop"),
+        (f"{LINES}for (int i = 0; i < 2; i += 2) {{\n  L.add({LINK});\n}}\n", "of a loop"),
         (f"{LINES}L = [{LINK} for i in reversed(range(2))]\n", "of a loop"),
         (f"{LINES}L = []\nfor i in range(2):\n    if i:\n        L.append({LINK})\n", "of a loop"),
         (f"{LINES}L = []\n{2 * f'for i in range(2):{chr(10)}    L.append({LINK}){chr(10)}'}", "of a loop"),
