@@ -37,7 +37,7 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
 from er3a.numerics.arrays import Reals
-from er3a.numerics.peaks import box_points, peak
+from er3a.numerics.peaks import PEAK_STEPS, box_points, peak
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import CombinedLimit, Robot, Source
 
@@ -47,7 +47,9 @@ Uncompared = Literal[
 ]
 Columns = dict[str, Reals | str]
 ALIGN_POSES, ALIGNED, STEPS = 100, 30, {"maxiter": 5}  # of the first round; rounds, and steps in each
-SAME_FOUND = 1 + 2e-4  # of the worst distance in an alignment, when a search ends
+CLIMB = 10  # steps to a worst pose in each round
+SAME_FOUND = 1 + 5e-4  # of the worst distance in an alignment, when a search ends
+SLOPE_STEP = 1e-7  # m, rad, between alignments of which a slope is the difference
 NEAR_WORST = 0.8  # of it, from which on a pose is kept
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
 NO_TURN, HALF_TURN = 1e-9, np.pi - 1e-4  # rad, below and above which an axis has no sense
@@ -537,29 +539,40 @@ def _aligned(
     x, least, bound = np.zeros(8 + a.rows), np.inf, NO_OFFSET
 
     def moved(x: Reals) -> Alignment:
-        """Turned (rad) and shifted (m) at the base, shifted at the flange, with other zeros after the first."""
-        base = posed(exp_rotation(x[:3]), x[3:6]) @ start.base
-        return Alignment(base, start.flange @ translation(*x[6:9]), start.zeros + np.r_[0, x[9:]], start.signs)
+        """Turned (rad) and shifted (m) at the base, shifted at the flange, other zeros after the first; x (..., p)."""
+        base, flange = posed(exp_rotation(x[..., :3]), x[..., 3:6]), posed(exp_rotation(0 * x[..., :3]), x[..., 6:9])
+        zeros = start.zeros + np.concatenate([0 * x[..., :1], x[..., 9:]], axis=-1)
+        return Alignment(base @ start.base, start.flange @ flange, zeros, start.signs)
 
     def flanges(by: Alignment, poses: Reals) -> tuple[Reals, Reals]:
+        """A's flanges (k, 4, 4), and those of B as one alignment or several of them, (..., k, 4, 4), bring them."""
         u = row_values(a, poses)
-        there = forward_of_rows(b, by.signs * (u - by.zeros * a.direction))
-        return forward_of_rows(a, u), by.base @ there @ np.linalg.inv(by.flange)
+        rows = by.signs * (u - (by.zeros * a.direction)[..., None, :])
+        there = forward_of_rows(b, rows.reshape(-1, b.rows)).reshape(*rows.shape[:-1], 4, 4)
+        return forward_of_rows(a, u), by.base[..., None, :, :] @ there @ np.linalg.inv(by.flange)[..., None, :, :]
 
     def now(poses: Reals) -> tuple[Reals, Reals]:
         return flanges(moved(x), poses)
 
+    def room(y: Reals) -> Reals:
+        """By how much the distance at each pose is below the bound, the last of y (..., p + 1)."""
+        return y[..., -1:] - shift_between(*flanges(moved(y[..., :-1]), q))
+
+    def slopes(y: Reals) -> Reals:
+        there, *near = room(np.vstack([y, y + SLOPE_STEP * np.eye(len(y))]))
+        return np.transpose(near - there) / SLOPE_STEP
+
+    nearer = {"type": "ineq", "fun": room, "jac": slopes}
     for _ in range(1 if same else ALIGNED):
-        off, ends = worst_poses(shift_between, now, a)
+        off, ends = worst_poses(shift_between, now, a, PEAK_STEPS if same else CLIMB)
         if off[0] < least:
             best, least = moved(x), off[0]
         if least <= bound * SAME_FOUND:
             break
         q = np.r_[q, ends]
-        nearer = {"type": "ineq", "fun": lambda y, q=q: y[-1] - shift_between(*flanges(moved(y[:-1]), q))}
         y = scipy.optimize.minimize(lambda y: y[-1], np.r_[x, off[0]], constraints=nearer, options=STEPS).x.round(SHOWN)
         x, bound = y[:-1], y[-1]
-        q = q[shift_between(*now(q)) > NEAR_WORST * bound]
+        q = q[room(y) < (1 - NEAR_WORST) * bound]
     one, other = (each[:, :3, :3] for each in flanges(best, q))
     turn = nearest_rotations(np.einsum("kjl,kji->li", one, other))
     best = replace(best, flange=posed(turn, np.zeros(3)) @ best.flange)
@@ -573,13 +586,13 @@ def shift_between(one: Reals, other: Reals) -> Reals:
 
     Parameters
     ----------
-    one, other : (k, 4, 4), m
+    one, other : (..., k, 4, 4), m
 
     Returns
     -------
-    shift : (k,), m
+    shift : (..., k), m
     """
-    shift: Reals = np.linalg.norm(one[:, :3, 3] - other[:, :3, 3], axis=1)
+    shift: Reals = np.linalg.norm(one[..., :3, 3] - other[..., :3, 3], axis=-1)
     return shift
 
 
@@ -598,7 +611,10 @@ def turn_between(one: Reals, other: Reals) -> Reals:
 
 
 def worst_poses(
-    off: Callable[[Reals, Reals], Reals], flanges: Callable[[Reals], tuple[Reals, Reals]], robot: Robot
+    off: Callable[[Reals, Reals], Reals],
+    flanges: Callable[[Reals], tuple[Reals, Reals]],
+    robot: Robot,
+    steps: int = PEAK_STEPS,
 ) -> tuple[list[float], Reals]:
     """Where two flanges are most off over an arm's joint ranges, as far as :func:`peak` finds it.
 
@@ -607,6 +623,7 @@ def worst_poses(
     off : of poses (k, 4, 4) of both, what is sought (k,)
     flanges : the two at joint values (k, n)
     robot : whose ranges count
+    steps : of each climb, at most
 
     Returns
     -------
@@ -614,7 +631,7 @@ def worst_poses(
     q : (k, n), rad or m, where they were found
     """
     lower, upper = np.sort([robot.lower, robot.upper], axis=0)
-    q, largest = peak(lambda q: off(*flanges(q)), lower, upper, box_points(lower, upper))
+    q, largest = peak(lambda q: off(*flanges(q)), lower, upper, box_points(lower, upper), steps=steps)
     return largest.tolist(), q
 
 

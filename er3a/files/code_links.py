@@ -51,8 +51,6 @@ def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
             code.refuse(each.start, each.inside, *_OF_LOOP)
         made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
         made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells))]
-        if toolbox and "ikpy" in code.text:  # whose theta is added to the joint's angle
-            made = [cells | {"offset": cells["theta"], "theta": "0"} for cells in made]
         target = _target(each, target or "", bool(toolbox) and len(texts) == 1)
         for k, cells in enumerate(made):
             name = f"{target}.{k}" if target and len(made) > 1 else target

@@ -28,20 +28,29 @@ NamedList = tuple[str, Words, int, str]
 """A list's name, its cells, its line, and ``:`` or ``=``."""
 
 
+_NAMED = re.compile(
+    r"""
+    (?P<name>[A-Za-zα-ωΑ-Ω]\w*)["']?\]?                      # a, "a" or row["a"]
+    (?:\[\d*\]|\(1:\w+\))?\s*                              # C's a[6], MATLAB's a(1:6)
+    (?::(?:[ ]*\[\w+;[ ]*\d+\][ ]*|[^=:\n"'\d]*)(?==))?   # its type: Rust's a: [f64; 6] =, Python's a: list =
+    (?P<mark>[=:])\s*
+    (?:[\w.]+\(\s*|np\.r_\s*|c|\[[\d.]*\]\w+)?["']?$      # np.array(, np.r_, R's c(, Go's []float64
+    """,
+    re.VERBOSE,
+)
+"""What is written before the bracket of a list that has a name."""
+
+
 def named_lists(code: Code) -> Iterator[NamedList]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
-        name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?\]?(?:\[\d*\]|\(1:\w+\))?\s*(?::(?: *\[\w+; *\d+\] *|[^=:\n\"'\d]*)(?==))?"
-            r"([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c|\[[\d.]*\]\w+)?[\"']?$",
-            group.before,
-        )
+        named = _NAMED.search(group.before)
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
             r"^\.+$|[\[{:%]|(?<!\w)\([^()]*,|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
             re.sub(r"\w\[[^\[\]]*\]|\w+::", "q", closed_up(inside)),
         )
-        if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
+        if named is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
             continue
         factor = re.findall(r"\A[)\s]*'?\s*([*/][^;,\n]+|=(?!=))?", code.text[group.end + 1 :])[0]
         if factor == "=":  # the type of what follows
@@ -50,7 +59,7 @@ def named_lists(code: Code) -> Iterator[NamedList]:
         if len(cells) == 1 and (often := re.fullmatch(r"\*\s*(\d\d?)\s*", factor)):  # Python's [0.0] * 6
             cells, factor = cells * int(often[1]), ""
         cells = [f"({cell}){factor}" if factor else cell for cell in cells]
-        yield name[1], cells, code.line(group.start), name[2]
+        yield named["name"], cells, code.line(group.start), named["mark"]
 
 
 def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
@@ -119,15 +128,26 @@ _SUMMED = (
 _OF_VECTORS = words_of("a alpha d theta offset type direction pose")
 
 
+_NUMBERED = re.compile(
+    r"""
+    (?<![\w."'])(?P<quote>["'])?(?:DH_)?
+    (?P<name>al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)
+    (?P<bracket>[_({\[]*)(?P<number>\d{1,2})[)}\]]*(?(quote)(?P=quote))   # a1, "a1", a_{1}, a(1)
+    \s*(?P<mark>[:=])(?!=)\s*
+    (?!(?:\w+\.)?symbols?\()                                             # a symbol of SymPy is no value
+    (?P<value>[^,}\n;:=!\s\[{](?:::|[^,}\n;:=!])*)                       # C++'s std::numbers::pi is one
+    """,
+    re.IGNORECASE | re.VERBOSE,
+)
+"""An entry of a table that has a name with a number, and its value."""
+
+
 def numbered_lists(code: Code) -> Iterator[NamedList]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
-    name = r"(?<![\w.\"'])([\"'])?(?:DH_)?(al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)"
-    name += r"([_({\[]*)(\d{1,2})[)}\]]*(?(1)\1)"
-    pattern = rf"{name}\s*([:=])(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s\[{{](?:::|[^,}}\n;:=!])*)"
     spellings: dict[str, dict[str, dict[int, tuple[str, str, int]]]] = {}  # value, mark and place of each number
     text = re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text)
-    for each in re.finditer(pattern, text, re.I):
+    for each in _NUMBERED.finditer(text):
         _, name, bracket, number, mark, value = each.groups()
         for spelling in (f"{bracket}{name.isupper()}", "~"):  # D1 = 0.3; d(1) = D1
             entries = spellings.setdefault(spelling, {}).setdefault(name.lower(), {})
@@ -152,9 +172,7 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
         yield name + before, [cells[k] for k in sorted(cells)], code.line(place), mark
 
 
-_LOOP = re.compile(
-    r"\bfor\b\s*\(?\s*(?:(?:const|let|auto|u?int\w*|size_t|unsigned)\s+)*([\w, ()]+?)\s*(?:\bin\b|=|:)\s*([^\n]*)"
-)
+_LOOP = re.compile(r"\bfor\b([^\n]*)")
 
 
 MOST_PASSES = 99  # more than any arm has links
@@ -164,12 +182,6 @@ _INDEX = re.compile(r"@\d+|[\[({][^\[\](){}]*[\])}]|\.\w+")
 
 
 _REFERENCE = re.compile(rf"(?<![\w.'\"@])([^\W\d]\w*)((?:{_INDEX.pattern})+)")
-
-
-_LENGTH = re.compile(r"(?:len|size|length|numel|height)\(\s*(\w+)\b(?:[^()]|\([^()]*\))*\)|(\w+)\.shape\[0\]")
-
-
-_RANGE = re.compile(r"(?:range\(|(?=\d+ *[:;]))(?:(\d+) *(,|:|;[^;<]*<=?) *)?(\w+)(?:\)|;.*)?")
 
 
 _LANGUAGE = r"(?m)^\s*end\b|\b(?:import|def|range|zip|np|float|double|const|let|var|auto|self)\b"
@@ -183,6 +195,29 @@ def _set_in(body: str) -> Cells:
         own = re.findall(r"\w+", names)
         named |= {name: f"{value}@{k}" if own[1:] else value for k, name in enumerate(own)}
     return named
+
+
+def _header(line: str) -> tuple[Words, str]:
+    """The names that get a value in each pass of a loop, and what it goes through; of ``i, row in enumerate(rows):``,
+    ``(int i = 0; i < 6; i++) {``, ``(const auto& row : rows) {``, ``(const row of rows) {`` or ``i = 1:n``."""
+    mark = next((each for each in (" in ", " of ", "=", ":") if each in line), "=")
+    names, _, over = line.partition(mark)
+    words = [re.findall(r"\w+", part) for part in names.split(",")]
+    return [part[-1] for part in words if part], over.strip(" :{")  # its type is before a name
+
+
+def _numbers(over: str) -> tuple[int, str, bool] | None:
+    """The first number of a loop, its end as it is written, and whether that is one, too; None of other loops."""
+    if over.startswith("range("):
+        first, _, end = over[6:-1].rpartition(",")
+    elif ";" in over and "+=" not in over:
+        first, condition, *_ = over.split(";")
+        end = condition.partition("<")[2]
+    else:
+        first, _, end = over.partition(":")
+    first, end = first.strip() or "0", end.strip()
+    closed = ":" in over or end.startswith("=")
+    return (int(first), end.lstrip("= "), closed) if first.isdigit() and end else None
 
 
 class Lists:
@@ -199,9 +234,6 @@ class Lists:
             if len(rows := rows_of(code, group)) > 1 and (name := list_name(group)) not in self.values:
                 inner = [record_of(each) for each in code.groups if group.start < each.start < group.end]
                 self.values[name] = [each for each in inner if is_row(each)] or [row for _, row in rows]
-            columns = [self.values.get(cell.strip("'"), [cell] * MOST_PASSES) for cell in row_cells(group.inside)]
-            if len(columns) > 2 and re.fullmatch(r"(?:\s*\w+',?){3,}\s*", group.inside):  # [theta' d' a' alpha']
-                self.values[list_name(group)] = [list(row) for row in zip(*columns)]
 
     def written_out(self, call: CodeGroup) -> Words:
         """The arguments of a call as often as it is carried out, with the elements of lists in place of their names."""
@@ -209,9 +241,8 @@ class Lists:
         around = [each for each in self.code.groups if each.start < call.start < call.end < each.end]
         built = [found for each in around if (found := _LOOP.search(code, call.end, each.end))]
         loops = built or [*_LOOP.finditer(code, 0, call.start)]
-        target, over = loops[-1].groups() if loops else ("i", "n")
+        names, over = _header(loops[-1][1]) if loops else (["i"], "n")
         body = code[loops[-1].end() : call.start] if loops else ""
-        names, over = re.findall(r"\w+", target), over.strip(" :{")
         text = filled(call.inside, _set_in(body))
         own = {*re.findall(r"\w+", text)}
         if built or (own.intersection(names) and not re.search(r"\b(?:def|function)\b", body)):
@@ -230,15 +261,16 @@ class Lists:
         """What the names of a loop stand for in each pass; a row may be unpacked into the last ones. If an unknown name
         says how many passes there are, they go through all of the lists that a call takes."""
         counts = {name: len(value) for name, value in self.values.items()}
-        known = {name: value for name, value in PART.findall(self.code.text) if value.isdigit()}
-        bounds = filled(_LENGTH.sub(lambda found: str(counts.get(found[1] or found[2], "n")), over), known)
-        ranged = _RANGE.fullmatch(bounds)
-        lists = [] if ranged else [name for name in re.findall(r"\w+", over) if name in counts]
+        numbers = _numbers(over)
+        lists = [] if numbers else [name for name in re.findall(r"\w+", over) if name in counts]
         every = min([counts[name] for name in lists or re.findall(r"\w+", text) if name in counts], default=0)
-        first, last = 0, every if re.match(r"enumerate\(|zip\(|[\w.]+$", over) else 0
-        if ranged:
-            first, end = int(ranged[1] or 0), ranged[3]
-            last = int(end) + ((ranged[2] or ",")[-1] in ":=") if end.isdigit() else first + every
+        first, last = 0, every if re.match(r"enumerate\(|zip\(|[\w.]+\)?$", over) else 0
+        if numbers:
+            first, end, closed = numbers
+            known = counts | {name: int(value) for name, value in PART.findall(self.code.text) if value.isdigit()}
+            ends = [known[name] for name in re.findall(r"\w+", end) if name in known]  # n, or len(rows)
+            last = int(end) if end.isdigit() else ends[0] if ends else first + every - closed
+            last = first if re.search(r"[-+*/:]", end) else last + closed
         for k in range(first, min(last, MOST_PASSES)):
             found = [str(k)] * ("enumerate(" in over or not lists) + [f"{name}@{k}" for name in lists]
             rest = [f"{found[-1]}@{part}" for part in range(len(names) - len(found) + 1)]

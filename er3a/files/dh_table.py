@@ -28,7 +28,6 @@ from er3a.files.printed_table import (
     FIXED,
     PER_MM,
     PrintedTable,
-    check_size,
     nearest_headings,
     printed_table,
     table_text,
@@ -122,7 +121,7 @@ def read_dh_table(
         notes.append(f"row {', '.join(fixed)}: nothing moves there; read as a fixed transform")
     rows, placed = _without_fixed_rows(rows, convention)
     if [row["joint"] for row in rows] != list(range(1, len(rows) + 1)) or not 1 <= len(rows) <= MAX_JOINTS:
-        problem = f"the joints are {', '.join(str(row['joint']) for row in rows) or 'none'}"
+        problem = f"the joints are {', '.join(str(row['joint']) for row in rows)[:60] or 'none'}"
         remedy = f"er3a models 1 to {MAX_JOINTS} joints: write one row for each, from 1 on in order"
         raise InputError(path, "column joint", problem, remedy)
     for row in rows:
@@ -147,16 +146,14 @@ def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -
     Raises
     ------
     InputError
-        for a file without one, and for one with more rows than any arm
+        for a file without one
     """
     text = table_text(path) if text is None else text
     found = printed_table(path, text, columns)
     if found is None and path.suffix != ".csv":
         problem = nearest_headings(text) or "no row of headings with a, alpha and d was found"
         raise InputError(path, None, problem, "Name the columns, or say what they are: --column theta,d,a,alpha")
-    found = found or PrintedTable(read_lines(path), ())
-    check_size(path, found.lines)
-    return found
+    return found or PrintedTable(read_lines(path), ())
 
 
 def _check_pairs_of_limits(path: Path, given: set[str]) -> None:

@@ -29,7 +29,7 @@ from er3a.files.table_code import code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
-from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
+from er3a.robots.robot import CONVENTIONS, Convention
 
 FIXED = "fixed", "tool"
 NEEDED = frozenset({"a", "alpha", "d"})
@@ -90,12 +90,19 @@ SIGNS = {
 """What a text says of its convention: words, a toolbox's option, or the transform of a row, of which Craig's alone has
 ``d sin(alpha)``, whatever its names (``cos(x), -sin(x), -sin(x)*y``), and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
-    r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*"
-    r"((?:\((?:[^()\n]|\([^()\n]*\))*\)|[^=\n()])+?)"
-    r"(?=[),;，；。%#≈`\n]|:\s|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\((?:[^\W\d]{3,}[\s)]|[^()]*°\))|"
-    r"\s+[^\W\d][\w{}]*[ \t]*=|$)"
-    r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
+    r"""
+    (?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)      # a name: a2, a_2, a(2), self.a2
+    [ \t]*=(?!=)[ \t]*
+    ((?:\((?:[^()\n]|\([^()\n]*\))*\)|[^=\n()])+?)                   # its value, with all of its brackets
+    (?=[),;，；。%\#≈`\n]|:\s|$                                       # which ends at a mark,
+    |\s+(?:and|und|et|y)\b                                          # a word,
+    |(?<=[\w.°])\s+\((?:[^\W\d]{3,}[\s)]|[^()]*°\))                  # a remark in brackets,
+    |\s+[^\W\d][\w{}]*[ \t]*=)                                      # or the next name
+    (?:[;,]?[ \t]*[%\#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?       # a comment that says the unit
+    """,
+    re.VERBOSE,
 )
+"""A name that has a value."""
 
 _JOINT = re.compile(r"(?<!\w)(?:q|θ|th|theta|t)_?[\[(]?\d")
 """A variable of a joint, which one of another name may be given by: ``theta2 = q2 - pi/2``."""
@@ -129,28 +136,6 @@ class PrintedTable:
 MAX_BYTES = 200_000
 LONGEST_IN_M = 2.5  # a link of a robot; the same number of mm is none
 RIGHT_WITHIN = 1e-3  # rad and deg: right angles as printed with three decimals or more
-MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
-
-
-def check_size(path: Path, lines: Lines) -> None:
-    """Refuse more rows than any arm has.
-
-    Parameters
-    ----------
-    lines : the header and the rows
-
-    Raises
-    ------
-    InputError
-        with the number of rows
-    """
-    if len(lines) > MOST_LINES:
-        raise InputError(
-            path,
-            None,
-            f"{len(lines) - 1:,} rows are no arm's table",
-            f"er3a models 1 to {MAX_JOINTS} joints: write one row for each",
-        )
 
 
 def table_text(path: Path) -> str:
@@ -439,20 +424,12 @@ class _Table:
         said = _IN_UNIT.search(text) and not re.search(r"100\b|1000\b|(?<!\d)0?\.0+1\b|25\.4|1e-?3", text)
         return [*units - {"m"}] if said and len(units) == 1 and longest > LONGEST_IN_M else []
 
-    def _values(self, k: int) -> list[float | None]:
-        """The values of a column in mm and degrees, as nearly as they are printed."""
-        unit = self.headings[k].unit
-        found = self._amounts(k)
-        return [round(_in(replace(each, unit=each.unit or unit), "deg"), 1) if each else None for each in found]
-
     def _check_headings(self) -> None:
         """Refuse two columns of one quantity, and d beside r, of which either can be the link's length."""
-        for k, own in [*self.headings.items()]:
+        for k, own in self.headings.items():
             first = self.column.setdefault(own.quantity, k)
-            if k != first and own.unit and self._values(k) == self._values(first):
-                del self.headings[k]  # said in another unit, too
-            elif k != first:
-                other = self.header[self.column[own.quantity]]
+            if k != first:
+                other = self.header[first]
                 self._refuse(
                     None,
                     k,
@@ -498,15 +475,10 @@ class _Table:
             [_SEVERAL.sub("", self.text), *(f"{name} = {value}" for each in pairs for name, value in each)]
         )
         given = _GIVEN.findall(self.text)
-        above = len(_GIVEN.findall("\n".join(self.text.split("\n")[: self.rows[0][0] - 1])))
         given += re.findall(r"[{,]\s*([a-z]\w*\d)\s*:\s*([-\d.]+)()(?=\s*[,}])", self.text)
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
         found: Cells = {}
-        for k, (name, value, unit) in enumerate(given):
-            own = rf"(?<![\w.]){re.escape(name)}\b"
-            if name in found and found[name] != TWO_VALUES and re.search(own, value):  # converted: a = a / 180 * pi
-                found[name] = re.sub(own, f"({found[name]})", value) if k < above else found[name]
-                continue
+        for name, value, unit in given:
             made = _CALL.fullmatch(value)
             if not re.search(r"[\"']|\[(?!\d+\])|\(\)$", value) and (made is None or made[1] in CALLED):
                 value = f"({value}) {unit}" if unit else value.rstrip(" \t.")

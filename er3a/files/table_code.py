@@ -81,10 +81,13 @@ def _puts_in(found: re.Match[str], name: str, table: Grid) -> bool:
     return place_of(column) != "theta" or not added or bool(re.search(r"-|(?<!\w)\d|[\[{]", value))
 
 
-_SET = (
-    r"(?m)(?:(?<![(,]\n)(?<![(,]\r\n)^|;)[ \t]*(?:del[ \t]+NAME\b|NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
-    r"[ \t]*((?:\.\w+|[\[({][^\n=\])}]*[\])}])*)[ \t]*([-+*/]?)=(?!=)([^\n;]*)))"
-)
+_SET = r"""(?mx)
+    (?:(?<![(,]\n)(?<![(,]\r\n)^|;)[ \t]*                  # where a statement begins, and no argument
+    (?:del[ \t]+NAME\b
+    |NAME(?:\.(?:append|insert|extend|pop|reverse)\(
+    |[ \t]*((?:\.\w+|[\[({][^\n=\])}]*[\])}])*)[ \t]*      # the place in it: NAME[0][1], NAME(1).a
+    ([-+*/]?)=(?!=)([^\n;]*)))                             # += or =, and the value
+"""
 """A statement that puts something into a list, or gives its name to something else; no argument
 ``d=d[j]`` on a line of its own."""
 

@@ -46,7 +46,9 @@ def box_points(lower: Reals, upper: Reals, count: int = SCAN) -> Reals:
     return np.concatenate(points)
 
 
-def peak(function: Function, lower: Reals, upper: Reals, points: Reals, climbs: int = CLIMBS) -> tuple[Reals, Reals]:
+def peak(
+    function: Function, lower: Reals, upper: Reals, points: Reals, climbs: int = CLIMBS, steps: int = PEAK_STEPS
+) -> tuple[Reals, Reals]:
     """Where a function is largest in a box, by Newton's method from the best of given points.
 
     Parameters
@@ -54,22 +56,22 @@ def peak(function: Function, lower: Reals, upper: Reals, points: Reals, climbs: 
     function : from points (P, d) to values (P,)
     lower, upper : (d,), of the box
     points : (P, d), where to look first
-    climbs : how many starts
+    climbs, steps : how many starts, and at most how many steps from each
 
     Returns
     -------
     at, values : maxima (K, d) and the function there (K,), the largest first; the largest that were found, not proven
     """
     starts = points[_best_apart(points, function(points), climbs)]
-    ends, values = _climb(function, starts, lower, upper)
+    ends, values = _climb(function, starts, lower, upper, steps)
     order = np.argsort(-values, kind="stable")
     return ends[order], values[order]
 
 
-def _climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Reals, Reals]:
+def _climb(function: Function, q: Reals, lower: Reals, upper: Reals, most: int) -> tuple[Reals, Reals]:
     """From points (K, d) up to the next maximum each, all in one batch: the points and their values (K,)."""
     q, here, going = q.copy(), np.empty(len(q)), np.arange(len(q))
-    for _ in range(PEAK_STEPS):
+    for _ in range(most):
         values = _of_each(function, q[going, None] + _stencil(q.shape[1]))
         here[going] = values[:, 0]
         steps = np.array([_step(own, q[k], lower, upper) for own, k in zip(values, going)])

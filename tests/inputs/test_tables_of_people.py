@@ -678,6 +678,8 @@ IN_MATLAB = "DH = [0 0.29 0 -pi/2 0 0;\n 0 0 0.27 0 0 -pi/2];\n"
         f"{LISTS}links = []\nfor i in range(2):\n    one = RevoluteDH(d=d[i], a=a[i], alpha=alpha[i],\n"
         "                     offset=off[i])\n    links.append(one)\n",
         f"{LISTS}L = [RevoluteDH(d=x, a=y, alpha=z, offset=w) for x, y, z, w in zip(d, a, alpha, off)]\n",
+        f"{MATRIX}for (const auto& r : DH) {{\n    L.add(RevoluteDH(d=r[1], a=r[2], alpha=r[3], offset=r[0]));\n}}\n",
+        f"{MATRIX}for (const r of DH) {{\n    L.push(RevoluteDH(d=r[1], a=r[2], alpha=r[3], offset=r[0]));\n}}\n",
         f"{RECORDS}for p in dh:\n    L.append(RevoluteDH(d=p['d'], a=p['a'], alpha=p['alpha'], offset=p['theta']))\n",
         f"{MATRIX}for i in range(len(DH)):\n    theta, d, a, alpha = DH[i]\n"
         "    L.append(RevoluteDH(d=d, a=a, alpha=alpha, offset=theta))\n",
@@ -793,6 +795,8 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
     ("text", "names"),
     [
         (f"{LINES}L = []\nfor i in range(1):\n    L.append({LINK})\n", "of a loop"),
+        (f"{LINES}for i = 1:2:2\n  L(i) = Revolute('d', d(i), 'a', a(i), 'alpha', alpha(i));\nend\n", "of a loop"),
+        (f"{LINES}for (int i = 0; i < 2; i += 2) {{\n  L.add({LINK});\n}}\n", "of a loop"),
         (f"{LINES}L = [{LINK} for i in reversed(range(2))]\n", "of a loop"),
         (f"{LINES}L = []\nfor i in range(2):\n    if i:\n        L.append({LINK})\n", "of a loop"),
         (f"{LINES}L = []\n{2 * f'for i in range(2):{chr(10)}    L.append({LINK}){chr(10)}'}", "of a loop"),
@@ -931,16 +935,13 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "dh(1).a = 0; dh(1).alpha = -pi/2; dh(1).d = 290; dh(1).offset = 0;\n"
         "dh(2).a = 270; dh(2).alpha = 0; dh(2).d = 0; dh(2).offset = -pi/2;\nfor i = 1:2\n"
         "  L(i) = Link('d', dh(i).d, 'a', dh(i).a, 'alpha', dh(i).alpha, 'offset', dh(i).offset);\nend\n",
-        "turned = [0 -pi/2];\nd = [290 0];\na = [0 270];\nalpha = [-pi/2 0];\ndh = [turned' d' a' alpha'];\n"
-        "for i = 1:2\n  L(i) = Link('d', dh(i,2), 'a', dh(i,3), 'alpha', dh(i,4), 'offset', dh(i,1));\nend\n",
         "a, d = [0, 270], [290, 0]\nalpha = [-pi/2, 0]\ntheta = [0, -pi/2]\n"
         "for i in range(2):\n  T = T @ f(theta[i] + q[i])\n",
         "% theta d a alpha\nL = [290, 270];\nDH = {[0, L(1), 0, -pi/2], [-pi/2, 0, L(2), 0]};\n",
         "dh = lambda t1, t2: [[theta1, d1, 0, -pi/2], [theta2 - pi/2, 0, a2, 0]]\nd1 = 290\na2 = 270\n",
         "def link(a, d, alpha, theta):\n  pass\nrows = [(0, 290, -pi/2), (270, 0, 0)]\ntheta_offset = [0, -pi/2]\n",
-        "d1 = 290000\nd1 = d1 / 1000\n# a alpha d theta\nM = [[0, -pi/2, d1, 0], [270, 0, 0, -pi/2]]\n",
-        "| i | α (rad) | α (deg) | a (mm) | d (mm) | θ (deg) |\n|--|--|--|--|--|--|\n| 1 | -π/2 | -90 | 0 | 290 | 0 |\n"
-        "| 2 | 0 | 0 | 270 | 0 | β - 120 |\n\nβ = 30°\n",
+        "| i | α (rad) | a (mm) | d (mm) | θ (deg) |\n|--|--|--|--|--|\n| 1 | -π/2 | 0 | 290 | 0 |\n"
+        "| 2 | 0 | 270 | 0 | β - 120 |\n\nβ = 30°\n",
         "# Units: lengths in cm\n# a alpha d theta\nM = [[0, -pi/2, 29, 0], [27, 0, 0, -pi/2]]\ntypes = ['R', 'R']\n",
         "float dh[2][4] = { // d, a, alpha, theta\n  {290.0, 0.0, -(float)M_PI/2, 0.0},\n"
         "  {0.0, 270.0, 0.0, (float)-M_PI/2}};\n",
@@ -989,6 +990,16 @@ def test_a_convention_by_which_two_joints_turn_about_one_line_is_asked_back(tmp_
         (
             "SDH (its numbers are those of the MDH)\n\ni,a,alpha,d,theta\n1,0,0,290,q1\n2,270,90,0,q2\n",
             "says standard and",
+        ),
+        (
+            "t = [0 1];\nd = [2 0];\na = [0 3];\nalpha = [1 0];\ndh = [t' d' a' alpha'];\nfor i = 1:2\n"
+            "  L(i) = Link('d', dh(i,2), 'a', dh(i,3), 'alpha', dh(i,4), 'offset', dh(i,1));\nend\n",
+            "row 7, column d",
+        ),
+        ("d1 = 290000\nd1 = d1 / 1000\n# a alpha d theta\nM = [[0, -pi/2, d1, 0], [270, 0, 0, 0]]\n", "two values"),
+        (
+            "| i | α (rad) | α (deg) | a | d | θ |\n|--|--|--|--|--|--|\n| 1 | 1 | 57 | 0 | 290 | 0 |\n",
+            "both mean alpha",
         ),
     ],
 )
