@@ -592,7 +592,7 @@ def _words(values: Reals) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-REASONS = {"never": "Never", "joined": "Adjacent", "allowed": "User", "overlaps": "Default", "guessed": "Default"}
+REASONS = {"never": "Never", "joined": "Adjacent", "allowed": "User", "overlaps": "Default", "coarse": "Default"}
 
 
 def export_srdf(robot: Robot) -> str:

@@ -66,7 +66,7 @@ def covered_collisions(
     allowed = [name for name in pairs("allowed") if frozenset(name.split("/")) not in by_scene and name in hidden]
     contacts = base_contacts(robot, scene)
     with_tools = [bodies, *(bodies_of(arm, scene) for _, arm in arms)]
-    guessed = tuple(dict.fromkeys(label_of(each) for arm in with_tools for each in arm.guessed))
+    coarse = tuple(dict.fromkeys(label_of(each) for arm in with_tools for each in arm.coarse))
     shares = tuple(f"{link_label(link)}: {100 * share:.0f} %" for link, share in shapes.partial)
     uncovered = tuple(
         link_label(link) + (f": {1000 * by:.0f} mm" if np.isfinite(by) else "") for link, by in shapes.uncovered
@@ -81,7 +81,7 @@ def covered_collisions(
     )
     assumed = (
         Open("base_contacts", tuple(each.solid for each in contacts if not each.inside)),
-        Open("guessed_pairs", guessed),
+        Open("coarse_pairs", coarse),
     )
     count = robot.rows + 2
     open_links = {link_label(link) for link, _ in (*shapes.uncovered, *shapes.partial)}
