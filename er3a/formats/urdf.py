@@ -136,6 +136,7 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     moving = [joint.name for joint in found.joints if joint.moves]
     masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, moving, names)
     robot, empty = without_placeholders(robot.replace(**shapes, visuals=visuals, masses=masses))
+    weighed = weighed if robot.masses.links else ()  # nothing was made of masses that are no data
     stated = {
         "envelopes": any(shapes.values()),
         "inertia": robot.masses.links,

@@ -42,6 +42,7 @@ from er3a.kinematics.wrist_partitioned import (
 )
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.robot import Robot, derived
 
 SingularityType = Literal["wrist", "elbow", "shoulder"]
@@ -107,8 +108,8 @@ def characteristic_length(robot: Robot) -> float:
 def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditioning:
     """Manipulability [2]_, condition number and smallest singular value of the Jacobian at joint values.
 
-    For an arm with fewer than six joints these are the singular values of its n columns. Columns of prismatic joints
-    are multiplied by the length, so that they are comparable with those of revolute joints.
+    These are the singular values of as many directions as the arm moves its tool in (:func:`regular_rank`): at most as
+    many as it has joints, fewer of those with several slides in one direction. Columns of prismatic joints are multiplied by the length, so that they are comparable with those of revolute joints.
 
     Parameters
     ----------
@@ -125,7 +126,7 @@ def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditi
     J[..., :3, :] /= length
     if robot.sliding.any():
         J *= np.where(robot.slides, length, 1.0)
-    values = np.linalg.svd(J, compute_uv=False).astype(float)
+    values = np.linalg.svd(J, compute_uv=False)[..., : regular_rank(robot)].astype(float)
     smallest = values[..., -1]
     regular = smallest > ROUNDING * values[..., 0]
     condition = np.divide(values[..., 0], smallest, out=np.full_like(smallest, np.inf), where=regular)
@@ -237,6 +238,7 @@ def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
 
 DEPENDENT = 1e-6  # smallest singular value of columns that count as dependent, relative to that of the event
 SHORTEST, EDGE = 1e-9, 1e-4  # shares of the motion
+TRIED = 16  # joint vectors in which an arm's rank is looked for
 MAX_SAMPLES = 200_000  # of a motion; beyond that it is judged as it is sampled
 TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
 
@@ -276,6 +278,28 @@ def scaled_jacobian(robot: Robot, q: Reals) -> Reals:
     J = jacobian(robot, q)
     J[..., :3, :] /= length
     return J * np.where(robot.slides, length, 1.0) if robot.sliding.any() else J
+
+
+@derived
+def regular_rank(robot: Robot) -> int:
+    """The rank of an arm's Jacobian where the arm is not singular.
+
+    Parameters
+    ----------
+    robot : with six joints it may be below 6, too, as of an arm with two slides in one direction
+
+    Returns
+    -------
+    rank : the largest found in joint vectors that are spread over the limits
+    """
+    J = scaled_jacobian(robot, quasi_random_points(robot.lower, robot.upper, TRIED))
+    return int(np.linalg.matrix_rank(J, DEPENDENT).max())
+
+
+def _smallest(robot: Robot, J: Reals) -> Reals:
+    """Smallest singular value (N,) of scaled Jacobians (N, 6, n), among those that are not 0 everywhere."""
+    values = np.linalg.svd(J, compute_uv=False)
+    return np.asarray(values[..., regular_rank(robot) - 1], dtype=float)
 
 
 @derived
@@ -342,9 +366,8 @@ def rank_losses(
 def _smallest_and_sign(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
     """Smallest singular value (N,) of the scaled Jacobian, and its determinant's sign (N,), 1 unless six joints."""
     J = scaled_jacobian(robot, q)
-    smallest = np.asarray(np.linalg.svd(J, compute_uv=False)[..., -1], dtype=float)
-    sign = np.asarray(np.sign(np.linalg.det(J))) if robot.joints == 6 else np.ones(len(q))
-    return smallest, sign
+    full = robot.joints == regular_rank(robot) == 6
+    return _smallest(robot, J), np.asarray(np.sign(np.linalg.det(J))) if full else np.ones(len(q))
 
 
 def _refined(
@@ -512,7 +535,7 @@ class NearSingular:
         margin : (N,), below 1 is near; -1 where joint values are NaN, for unreachable poses
         """
         if not has_branches(robot):
-            smallest = np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[..., -1]
+            smallest = _smallest(robot, scaled_jacobian(robot, q))
             return np.asarray(np.nan_to_num(smallest / self.smallest, nan=-1.0))
         ratios = self.ratios(determinant_factors(robot, q))
         return np.where(np.isnan(ratios[0]), -1.0, ratios.min(axis=0))
