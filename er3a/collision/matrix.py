@@ -5,15 +5,16 @@ As MoveIt's setup assistant has it, but that "never" is proven:
 - *joined*: a joint joins the two: no link with a shape is between them, or they are at most ``ACROSS`` joints apart
   and overlap in all joint vectors drawn (``TRIED``), as across a wrist. Hulls and surfaces are not checked then, nor
   those that stay within ``PLAY`` of each other there: what rubs at each joint value is a bearing, and whether it
-  touches by the rounding of a mesh's corners says nothing. Of capsules the region around the joint is left out, within the girth of both, from where they are nearest in the pose
-  in which they are farthest apart. The rest is checked, so that an arm that folds onto itself is seen;
+  touches by the rounding of a mesh's corners says nothing. Of capsules the region around the joint is left out, within
+  the girth of both, from where they are nearest in the pose in which they are farthest apart. The rest is checked, so
+  that an arm that folds onto itself is seen;
 - *overlaps*: they overlap in all joint vectors drawn and no joint explains it. No arm is built like that, so the shapes
   are wrong: they are not checked, and every result that does not examine them has to say so;
 - *coarse*: shapes of links as near to each other that overlap too often for an arm. Guessed from a table
   (:mod:`er3a.collision.shapes`): in many of the joint vectors drawn (``POOR_GUESS``), without that region if a joint
-  joins them. Hulls and surfaces that a file gives: in ``MOST``, and no joint vector parts them by ``ASSUMED_MARGIN``, or
-  they only slide along each other: housings and the stages of a telescope, drawn too large. A link that folds onto
-  another parts from it elsewhere. Not checked, and every result names them;
+  joins them. Hulls and surfaces that a file gives: in ``MOST``, and no joint vector parts them by
+  ``ASSUMED_MARGIN``, or they only slide along each other: housings and the stages of a telescope, drawn too large. A
+  link that folds onto another parts from it elsewhere. Not checked, and every result names them;
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: checked;

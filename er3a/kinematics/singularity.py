@@ -109,7 +109,8 @@ def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditi
     """Manipulability [2]_, condition number and smallest singular value of the Jacobian at joint values.
 
     These are the singular values of as many directions as the arm moves its tool in (:func:`regular_rank`): at most as
-    many as it has joints, fewer of those with several slides in one direction. Columns of prismatic joints are multiplied by the length, so that they are comparable with those of revolute joints.
+    many as it has joints, fewer of those with several slides in one direction. Columns of prismatic joints are
+    multiplied by the length, so that they are comparable with those of revolute joints.
 
     Parameters
     ----------
@@ -121,11 +122,7 @@ def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditi
     -------
     measures : (...) each, without unit
     """
-    length = characteristic_length(robot) if length is None else length
-    J = jacobian(robot, q)
-    J[..., :3, :] /= length
-    if robot.sliding.any():
-        J *= np.where(robot.slides, length, 1.0)
+    J = scaled_jacobian(robot, q, characteristic_length(robot) if length is None else length)
     values = np.linalg.svd(J, compute_uv=False)[..., : regular_rank(robot)].astype(float)
     smallest = values[..., -1]
     regular = smallest > ROUNDING * values[..., 0]
@@ -263,18 +260,19 @@ class RankLoss:
     axes: tuple[int, ...]
 
 
-def scaled_jacobian(robot: Robot, q: Reals) -> Reals:
-    """Jacobian with linear rows in parts of the arm's length, and prismatic joints too.
+def scaled_jacobian(robot: Robot, q: Reals, length: float | None = None) -> Reals:
+    """Jacobian with linear rows in parts of a length, and prismatic joints too.
 
     Parameters
     ----------
     q : (..., n), rad or m
+    length : m; None for the arm's
 
     Returns
     -------
     J : (..., 6, n), without unit
     """
-    length = arm_length(robot)
+    length = arm_length(robot) if length is None else length
     J = jacobian(robot, q)
     J[..., :3, :] /= length
     return J * np.where(robot.slides, length, 1.0) if robot.sliding.any() else J

@@ -49,7 +49,7 @@ TEXTS = texts(
             "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the shapes. "
             "What overlaps is not checked."
         ),
-        "why.coarse": "Their shapes overlap in too many joint vectors. Not checked: give closer shapes in the robot's file.",
+        "why.coarse": "Their shapes overlap in too many joint vectors. Not checked: give the robot closer shapes.",
         "why.meets": (
             "[{radius:?}They touch by design: left out within {radius:.0f} mm of their joint.]"
             "[{radius:?} Outside they collide at ({witness}).][{radius:?}{witness:!} Outside no collision was found.]"
