@@ -47,7 +47,7 @@ PairState = Literal["never", "joined", "overlaps", "coarse", "meets", "undecided
 
 ACROSS = 2  # joints that a wrist's housing hides
 POOR_GUESS = 0.1  # of the joint vectors drawn
-MOST = 0.5  # of the joint vectors drawn; of 65 arms, housings overlap in 0.6 or more of them, links that fold in 0.46
+MOST = 0.5  # of the joint vectors drawn; of 63 arms, housings overlap in 0.6 or more of them, links that fold in 0.46
 FEW = 8  # of the joint vectors drawn: in one of them most pairs part
 PLAY = 1e-3  # m, between housings that turn in each other
 BOXES = 50_000
@@ -157,10 +157,10 @@ def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[Bo
     joined = MatrixRow(*names, "joined"), list[BodyPair]()
     if neighbours and not capsules:
         return joined
-    q, overlap = _drawn(robot), _overlap(robot, pairs)
+    overlap = _overlap(robot, pairs)
     near, share = neighbours or outer.link - inner.link <= ACROSS, float(overlap.any(axis=1).mean())
     if share == 1.0 and not near:
-        return MatrixRow(*names, "overlaps", q[0]), []
+        return MatrixRow(*names, "overlaps", _drawn(robot)[0]), []
     if share == 1.0 and capsules:
         return _joined(robot, pairs, overlap)
     if near and not capsules and _held(robot, pairs, PLAY):
@@ -168,7 +168,7 @@ def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[Bo
     guessed = share >= POOR_GUESS and not arm_shapes(robot).given
     if near and (guessed or (share > MOST and own and not capsules and _never_parts(robot, pairs))):
         return MatrixRow(*names, "coarse"), []
-    return _checked(robot, pairs, q, overlap)
+    return _checked(robot, pairs, overlap)
 
 
 def _never_parts(robot: Robot, pairs: Sequence[BodyPair]) -> bool:
@@ -182,11 +182,11 @@ def _held(robot: Robot, pairs: Sequence[BodyPair], within: float) -> bool:
     return all(_least(robot, pairs, count).max() <= within for count in (FEW, TRIED))
 
 
-def _checked(robot: Robot, pairs: Sequence[BodyPair], q: Reals, overlap: Flags) -> tuple[MatrixRow, list[BodyPair]]:
-    """Bodies of two links that no joint joins, which overlap (N, K) in joint vectors (N, n): all but those that are
-    proven never to meet are to be checked."""
+def _checked(robot: Robot, pairs: Sequence[BodyPair], overlap: Flags) -> tuple[MatrixRow, list[BodyPair]]:
+    """Bodies of two links that no joint joins, which overlap (TRIED, K) in the joint vectors drawn: all but those that
+    are proven never to meet are to be checked."""
     met = overlap.any(axis=1)
-    boxes, witness = (BOXES_MORE, q[met.argmax()]) if met.any() else (BOXES, None)
+    boxes, witness = (BOXES_MORE, _drawn(robot)[met.argmax()]) if met.any() else (BOXES, None)
     watched, bounds, looked = [], [np.inf], 0
     for pair, meets in zip(pairs, np.asarray(overlap.any(axis=0)).tolist()):
         if not meets:
@@ -225,7 +225,7 @@ def _joined(robot: Robot, pairs: Sequence[BodyPair], overlap: Flags) -> tuple[Ma
         return row, []
     if left.any(axis=1).mean() >= POOR_GUESS and not arm_shapes(robot).given:
         return MatrixRow(*names, "coarse"), []
-    found, watched = _checked(robot, rest, _drawn(robot), left)
+    found, watched = _checked(robot, rest, left)
     return replace(row, witness=found.witness, boxes=found.boxes), watched
 
 

@@ -136,7 +136,6 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     moving = [joint.name for joint in found.joints if joint.moves]
     masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, moving, names)
     robot, empty = without_placeholders(robot.replace(**shapes, visuals=visuals, masses=masses))
-    weighed = weighed if robot.masses.links else ()  # nothing was made of masses that are no data
     stated = {
         "envelopes": any(shapes.values()),
         "inertia": robot.masses.links,
@@ -158,7 +157,8 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     }
     robot = robot.replace(sources={**robot.sources, **more})
     rounded = _unrounded(urdf_tree.read_chain(path, base, tip, False).joints, found.joints, values) if snap else ()
-    said = (*empty, *rounded, *found.notes, *notes, *shaped, *unseen, *weighed)
+    of_masses = weighed if robot.masses.links else ()  # nothing was made of masses that are no data
+    said = (*empty, *rounded, *found.notes, *notes, *shaped, *unseen, *of_masses)
     return UrdfImport(robot, said, float(misfit), names, found.joints[0].parent, found.joints[-1].child)
 
 

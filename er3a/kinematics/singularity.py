@@ -451,7 +451,7 @@ def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
     """
     J = scaled_jacobian(robot, q)
     J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
-    of_all = float(np.linalg.svd(J[:, : min(6, J.shape[1])] if J.shape[1] <= 6 else J, compute_uv=False)[-1])
+    of_all = float(np.linalg.svd(J, compute_uv=False)[-1])
     best: tuple[float, tuple[int, ...]] = (np.inf, ())
     for count in range(2, min(6, robot.joints) + 1):
         sets = list(combinations(range(robot.joints), count))

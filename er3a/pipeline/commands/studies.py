@@ -113,8 +113,8 @@ def check(
         broken = rules_broken(file, kind, xacro or ())
         for each in said:
             warnings.showwarning(each.message, each.category, each.filename, each.lineno)
-        texts = {str(each.message).removeprefix(f"{file}: ") for each in said if each.category is InputWarning}
-        notes = [(LocatedFinding("note", fact("input_note", text=text), Place(file)), text) for text in texts]
+        note = LocatedFinding("note", fact("input_note"), Place(file))
+        notes = [(note, str(each.message)) for each in said if each.category is InputWarning]
         rules += [Reported(*each) for each in broken + notes]
         named = [{"code": one.finding.code, "line": one.place.line, "text": text} for one, text in broken + notes]
         more |= {"rules": named} if named else {}
