@@ -80,7 +80,7 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("centre_outside", "unlikely_density", "unlikely_inertia", "unexplained_residuals"),
     *("no_correction_fits", "contradiction", "advice.no_part"),
     *("read_limit", "time_joint"),
-    *("payload", "why.guessed", "shapes_assumed"),
+    *("payload", "why.coarse", "shapes_assumed"),
     *("validation.off", "validation.no_reference", "validation.defined_otherwise", "far_from_table"),
 }
 NO_ADVICE = {"below_limit", "trajectory.paths"}

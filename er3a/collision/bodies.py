@@ -45,7 +45,7 @@ class Bodies:
     pairs : P, what meets what
     matrix : what was found of each pair of links
     in_error : pairs whose shapes overlap where no arm's can (:mod:`er3a.collision.matrix`), so that they are left out
-    guessed : pairs that are left out because capsules guessed from a table are too coarse there
+    coarse : pairs that are left out because their shapes are too coarse, or too large, there
     joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
     layout : the same as arrays, solids among the bodies
     """
@@ -67,7 +67,7 @@ class Bodies:
         kept = [(pair, held) for pair, held in found if frozenset(body.name for body in pair) not in allowed]
         met = (*(pair for pair, _ in kept), *around)
         numbers = {link_label(k): k for k in range(robot.rows + 1)}
-        self.in_error, self.guessed = (
+        self.in_error, self.coarse = (
             tuple[Pair, ...](
                 fact("link_pair", first=numbers[row.first], second=numbers[row.second])
                 if row.second in numbers
@@ -75,7 +75,7 @@ class Bodies:
                 for row in self.matrix
                 if row.state == state and frozenset((row.first, row.second)) not in allowed
             )
-            for state in ("overlaps", "guessed")
+            for state in ("overlaps", "coarse")
         )
         links = (body for pair, _ in kept for body in pair)
         number = {body: k for k, body in enumerate(dict.fromkeys((*links, *moving, *solids)))}

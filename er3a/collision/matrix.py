@@ -5,14 +5,16 @@ As MoveIt's setup assistant has it, but that "never" is proven:
 - *joined*: a joint joins the two: no link with a shape is between them, or they are at most ``ACROSS`` joints apart
   and overlap in all joint vectors drawn (``TRIED``), as across a wrist. Hulls and surfaces are not checked then, nor
   those that stay within ``PLAY`` of each other there: what rubs at each joint value is a bearing, and whether it
-  touches by the rounding of a mesh's corners says nothing. Neither are links that overlap in ``MOST``: no arm is built
-  like that, so housings, or the stages of a telescope, are drawn too large. Of
-  capsules the region around the joint is left out, within the girth of both, from where they are nearest in the pose
-  in which they are farthest apart. The rest is checked, so that an arm that folds onto itself is seen;
+  touches by the rounding of a mesh's corners says nothing. Of capsules the region around the joint is left out, within
+  the girth of both, from where they are nearest in the pose in which they are farthest apart. The rest is checked, so
+  that an arm that folds onto itself is seen;
 - *overlaps*: they overlap in all joint vectors drawn and no joint explains it. No arm is built like that, so the shapes
   are wrong: they are not checked, and every result that does not examine them has to say so;
-- *guessed*: shapes guessed from a table (:mod:`er3a.collision.shapes`), as near to each other, that overlap in many of
-  the joint vectors drawn (``POOR_GUESS``), without that region if a joint joins them. Not checked, and results say so;
+- *coarse*: shapes of links as near to each other that overlap too often for an arm. Guessed from a table
+  (:mod:`er3a.collision.shapes`): in many of the joint vectors drawn (``POOR_GUESS``), without that region if a joint
+  joins them. Hulls and surfaces that a file gives: in ``MOST``, and no joint vector parts them by
+  ``ASSUMED_MARGIN``, or they only slide along each other: housings and the stages of a telescope, drawn too large. A
+  link that folds onto another parts from it elsewhere. Not checked, and every result names them;
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: checked;
@@ -41,11 +43,11 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.robot import PairRule, Robot, derived
 
-PairState = Literal["never", "joined", "overlaps", "guessed", "meets", "undecided", "allowed", "watched"]
+PairState = Literal["never", "joined", "overlaps", "coarse", "meets", "undecided", "allowed", "watched"]
 
 ACROSS = 2  # joints that a wrist's housing hides
 POOR_GUESS = 0.1  # of the joint vectors drawn
-MOST = 0.5  # of the joint vectors drawn; of 40 arms, housings overlap in 0.6 or more of them, links that fold in 0.36
+MOST = 0.5  # of the joint vectors drawn; of 63 arms, housings overlap in 0.6 or more of them, links that fold in 0.46
 FEW = 8  # of the joint vectors drawn: in one of them most pairs part
 PLAY = 1e-3  # m, between housings that turn in each other
 BOXES = 50_000
@@ -155,17 +157,24 @@ def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[Bo
     joined = MatrixRow(*names, "joined"), list[BodyPair]()
     if neighbours and not capsules:
         return joined
-    q, overlap = _drawn(robot), _overlap(robot, pairs)
+    overlap = _overlap(robot, pairs)
     near, share = neighbours or outer.link - inner.link <= ACROSS, float(overlap.any(axis=1).mean())
     if share == 1.0 and not near:
-        return MatrixRow(*names, "overlaps", q[0]), []
+        return MatrixRow(*names, "overlaps", _drawn(robot)[0]), []
     if share == 1.0 and capsules:
         return _joined(robot, pairs, overlap)
-    if near and not capsules and ((own and share > MOST) or _held(robot, pairs, PLAY)):
+    if near and not capsules and _held(robot, pairs, PLAY):
         return joined
-    if near and share >= POOR_GUESS and not arm_shapes(robot).given:
-        return MatrixRow(*names, "guessed"), []
-    return _checked(robot, pairs, q, overlap)
+    guessed = share >= POOR_GUESS and not arm_shapes(robot).given
+    if near and (guessed or (share > MOST and own and not capsules and _never_parts(robot, pairs))):
+        return MatrixRow(*names, "coarse"), []
+    return _checked(robot, pairs, overlap)
+
+
+def _never_parts(robot: Robot, pairs: Sequence[BodyPair]) -> bool:
+    """Whether two links only slide along each other, or stay too near for any margin, so that neither can fold."""
+    inner, outer = pairs[0]
+    return bool(robot.sliding[inner.link : outer.link].all()) or _held(robot, pairs, ASSUMED_MARGIN)
 
 
 def _held(robot: Robot, pairs: Sequence[BodyPair], within: float) -> bool:
@@ -173,11 +182,11 @@ def _held(robot: Robot, pairs: Sequence[BodyPair], within: float) -> bool:
     return all(_least(robot, pairs, count).max() <= within for count in (FEW, TRIED))
 
 
-def _checked(robot: Robot, pairs: Sequence[BodyPair], q: Reals, overlap: Flags) -> tuple[MatrixRow, list[BodyPair]]:
-    """Bodies of two links that no joint joins, which overlap (N, K) in joint vectors (N, n): all but those that are
-    proven never to meet are to be checked."""
+def _checked(robot: Robot, pairs: Sequence[BodyPair], overlap: Flags) -> tuple[MatrixRow, list[BodyPair]]:
+    """Bodies of two links that no joint joins, which overlap (TRIED, K) in the joint vectors drawn: all but those that
+    are proven never to meet are to be checked."""
     met = overlap.any(axis=1)
-    boxes, witness = (BOXES_MORE, q[met.argmax()]) if met.any() else (BOXES, None)
+    boxes, witness = (BOXES_MORE, _drawn(robot)[met.argmax()]) if met.any() else (BOXES, None)
     watched, bounds, looked = [], [np.inf], 0
     for pair, meets in zip(pairs, np.asarray(overlap.any(axis=0)).tolist()):
         if not meets:
@@ -215,8 +224,8 @@ def _joined(robot: Robot, pairs: Sequence[BodyPair], overlap: Flags) -> tuple[Ma
     if not rest:
         return row, []
     if left.any(axis=1).mean() >= POOR_GUESS and not arm_shapes(robot).given:
-        return MatrixRow(*names, "guessed"), []
-    found, watched = _checked(robot, rest, _drawn(robot), left)
+        return MatrixRow(*names, "coarse"), []
+    found, watched = _checked(robot, rest, left)
     return replace(row, witness=found.witness, boxes=found.boxes), watched
 
 

@@ -157,7 +157,8 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     }
     robot = robot.replace(sources={**robot.sources, **more})
     rounded = _unrounded(urdf_tree.read_chain(path, base, tip, False).joints, found.joints, values) if snap else ()
-    said = (*empty, *rounded, *found.notes, *notes, *shaped, *unseen, *weighed)
+    of_masses = weighed if robot.masses.links else ()  # nothing was made of masses that are no data
+    said = (*empty, *rounded, *found.notes, *notes, *shaped, *unseen, *of_masses)
     return UrdfImport(robot, said, float(misfit), names, found.joints[0].parent, found.joints[-1].child)
 
 
@@ -592,7 +593,7 @@ def _words(values: Reals) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-REASONS = {"never": "Never", "joined": "Adjacent", "allowed": "User", "overlaps": "Default", "guessed": "Default"}
+REASONS = {"never": "Never", "joined": "Adjacent", "allowed": "User", "overlaps": "Default", "coarse": "Default"}
 
 
 def export_srdf(robot: Robot) -> str:

@@ -42,6 +42,7 @@ from er3a.kinematics.wrist_partitioned import (
 )
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.robot import Robot, derived
 
 SingularityType = Literal["wrist", "elbow", "shoulder"]
@@ -107,8 +108,9 @@ def characteristic_length(robot: Robot) -> float:
 def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditioning:
     """Manipulability [2]_, condition number and smallest singular value of the Jacobian at joint values.
 
-    For an arm with fewer than six joints these are the singular values of its n columns. Columns of prismatic joints
-    are multiplied by the length, so that they are comparable with those of revolute joints.
+    These are the singular values of as many directions as the arm moves its tool in (:func:`regular_rank`): at most as
+    many as it has joints, fewer of those with several slides in one direction. Columns of prismatic joints are
+    multiplied by the length, so that they are comparable with those of revolute joints.
 
     Parameters
     ----------
@@ -120,12 +122,8 @@ def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditi
     -------
     measures : (...) each, without unit
     """
-    length = characteristic_length(robot) if length is None else length
-    J = jacobian(robot, q)
-    J[..., :3, :] /= length
-    if robot.sliding.any():
-        J *= np.where(robot.slides, length, 1.0)
-    values = np.linalg.svd(J, compute_uv=False).astype(float)
+    J = scaled_jacobian(robot, q, characteristic_length(robot) if length is None else length)
+    values = np.linalg.svd(J, compute_uv=False)[..., : regular_rank(robot)].astype(float)
     smallest = values[..., -1]
     regular = smallest > ROUNDING * values[..., 0]
     condition = np.divide(values[..., 0], smallest, out=np.full_like(smallest, np.inf), where=regular)
@@ -237,6 +235,7 @@ def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
 
 DEPENDENT = 1e-6  # smallest singular value of columns that count as dependent, relative to that of the event
 SHORTEST, EDGE = 1e-9, 1e-4  # shares of the motion
+TRIED = 16  # joint vectors in which an arm's rank is looked for
 MAX_SAMPLES = 200_000  # of a motion; beyond that it is judged as it is sampled
 TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
 
@@ -261,21 +260,44 @@ class RankLoss:
     axes: tuple[int, ...]
 
 
-def scaled_jacobian(robot: Robot, q: Reals) -> Reals:
-    """Jacobian with linear rows in parts of the arm's length, and prismatic joints too.
+def scaled_jacobian(robot: Robot, q: Reals, length: float | None = None) -> Reals:
+    """Jacobian with linear rows in parts of a length, and prismatic joints too.
 
     Parameters
     ----------
     q : (..., n), rad or m
+    length : m; None for the arm's
 
     Returns
     -------
     J : (..., 6, n), without unit
     """
-    length = arm_length(robot)
+    length = arm_length(robot) if length is None else length
     J = jacobian(robot, q)
     J[..., :3, :] /= length
     return J * np.where(robot.slides, length, 1.0) if robot.sliding.any() else J
+
+
+@derived
+def regular_rank(robot: Robot) -> int:
+    """The rank of an arm's Jacobian where the arm is not singular.
+
+    Parameters
+    ----------
+    robot : with six joints it may be below 6, too, as of an arm with two slides in one direction
+
+    Returns
+    -------
+    rank : the largest found in joint vectors that are spread over the limits
+    """
+    J = scaled_jacobian(robot, quasi_random_points(robot.lower, robot.upper, TRIED))
+    return int(np.linalg.matrix_rank(J, DEPENDENT).max())
+
+
+def _smallest(robot: Robot, J: Reals) -> Reals:
+    """Smallest singular value (N,) of scaled Jacobians (N, 6, n), among those that are not 0 everywhere."""
+    values = np.linalg.svd(J, compute_uv=False)
+    return np.asarray(values[..., regular_rank(robot) - 1], dtype=float)
 
 
 @derived
@@ -342,9 +364,8 @@ def rank_losses(
 def _smallest_and_sign(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
     """Smallest singular value (N,) of the scaled Jacobian, and its determinant's sign (N,), 1 unless six joints."""
     J = scaled_jacobian(robot, q)
-    smallest = np.asarray(np.linalg.svd(J, compute_uv=False)[..., -1], dtype=float)
-    sign = np.asarray(np.sign(np.linalg.det(J))) if robot.joints == 6 else np.ones(len(q))
-    return smallest, sign
+    full = robot.joints == regular_rank(robot) == 6
+    return _smallest(robot, J), np.asarray(np.sign(np.linalg.det(J))) if full else np.ones(len(q))
 
 
 def _refined(
@@ -430,7 +451,7 @@ def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
     """
     J = scaled_jacobian(robot, q)
     J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
-    of_all = float(np.linalg.svd(J[:, : min(6, J.shape[1])] if J.shape[1] <= 6 else J, compute_uv=False)[-1])
+    of_all = float(np.linalg.svd(J, compute_uv=False)[-1])
     best: tuple[float, tuple[int, ...]] = (np.inf, ())
     for count in range(2, min(6, robot.joints) + 1):
         sets = list(combinations(range(robot.joints), count))
@@ -512,7 +533,7 @@ class NearSingular:
         margin : (N,), below 1 is near; -1 where joint values are NaN, for unreachable poses
         """
         if not has_branches(robot):
-            smallest = np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[..., -1]
+            smallest = _smallest(robot, scaled_jacobian(robot, q))
             return np.asarray(np.nan_to_num(smallest / self.smallest, nan=-1.0))
         ratios = self.ratios(determinant_factors(robot, q))
         return np.where(np.isnan(ratios[0]), -1.0, ratios.min(axis=0))

@@ -22,6 +22,8 @@ from er3a.files.scene_file import SceneFile
 from er3a.finding import fact
 from er3a.kinematics.forward import frames
 from er3a.numerics.quasi_random import quasi_random_points
+from er3a.pipeline.scope import Open
+from er3a.pipeline.stages.covered import covered_collisions
 from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, PairRule, Robot
 from testing.arms import OTHERS_LONG, made_of, make_arm
 
@@ -232,7 +234,7 @@ def test_a_default_shape_that_slides_in_its_guide_is_too_coarse_to_be_checked():
         np.array([0.4, 0, 0, 0.05]), zero + 1, zero, np.array([-2.2, -2.4, 0, -6]), np.array([2.2, 2.4, 0.2, 6]),
         sliding=np.array([False, False, True, False]),
     )  # fmt: skip
-    assert rows_of(scara)["link_2", "link_4"].state == "guessed"
+    assert rows_of(scara)["link_2", "link_4"].state == "coarse"
     raised = np.array([[0.4, 0.2, slide, turn] for slide in (0.0, 0.03, 0.2) for turn in (0.0, 3.0)])
     assert Bodies(scara, None).free(raised).all()
     stated = scara.replace(envelopes=arm_shapes(scara).capsules)
@@ -245,10 +247,10 @@ def test_a_guess_that_overlaps_at_many_poses_refuses_none_of_them_and_is_named()
     arm = load_robot("er3a_c60_article")
     bare = arm.replace(pair_rules=())
     states = {names: row.state for names, row in rows_of(bare).items()}
-    assert states["base", "link_2"] == states["link_2", "link_4"] == "guessed"
+    assert states["base", "link_2"] == states["link_2", "link_4"] == "coarse"
     q = quasi_random_points(arm.lower, arm.upper, 2000)
     assert np.array_equal(Bodies(bare, None).free(q), Bodies(arm, None).free(q))
-    assert Bodies(bare, None).guessed == (fact("link_pair", first=0, second=2), fact("link_pair", first=2, second=4))
+    assert Bodies(bare, None).coarse == (fact("link_pair", first=0, second=2), fact("link_pair", first=2, second=4))
     assert Bodies(bare, None).in_error == Bodies(arm, None).in_error == ()
     stated = bare.replace(envelopes=arm_shapes(bare).capsules)
     assert not Bodies(stated, None).free(np.radians([[0.0, 45.0, -30.0, 0.0, 60.0, 0.0]])).any()
@@ -324,11 +326,11 @@ def test_neighbours_between_three_parallel_axes_may_lie_side_by_side():
     """As upper arm and forearm of a UR, which bends its elbow to about 160 deg. Others are checked as before."""
     arm = load_robot("ur5e")
     states = {names: row.state for names, row in rows_of(arm).items()}
-    assert states["link_2", "link_3"] == "guessed"
+    assert states["link_2", "link_3"] == "coarse"
     assert states["link_3", "link_4"] == "joined"
     assert states["link_2", "link_4"] == "meets"
     bodies = Bodies(arm, None)
-    assert fact("link_pair", first=2, second=3) in bodies.guessed
+    assert fact("link_pair", first=2, second=3) in bodies.coarse
     assert bodies.free(np.radians([[0.0, -90.0, 145.0, -90.0, -90.0, 0.0]])).all()
 
 
@@ -369,12 +371,17 @@ def test_neighbours_of_given_hulls_are_not_looked_at():
 
 @pytest.mark.parametrize(
     ("length", "wall", "state", "kept"),
-    [(0.015, 0.0175, "joined", True), (0.015, 0.02, "meets", True), (0.05, 0.052, "meets", False)],
+    [
+        (0.015, 0.0175, "coarse", True),
+        (0.015, 0.02, "meets", True),
+        (0.05, 0.052, "meets", False),
+        (0.05, 0.037, "meets", False),
+    ],
 )
 def test_a_margin_is_asked_of_links_that_can_keep_it(length, wall, state, kept):
-    """A bar that turns about two joints beside a wall: at most 2.5 or 5 mm from it, or, as it is longer, 37 mm.
+    """A bar that turns about two joints beside a wall: at most 2.5 or 5 mm from it, or, as it is longer, 37 or 22 mm.
 
-    The first meets the wall in most joint vectors.
+    The first and the last meet the wall in most joint vectors; the last one can also be well clear of it.
     """
     boxes = (
         box_around(0, (-0.1, wall, -0.1), (0.1, wall + 0.1, 0.1)),
@@ -384,13 +391,23 @@ def test_a_margin_is_asked_of_links_that_can_keep_it(length, wall, state, kept):
     robot = made_of([("R", 0, 0, 0, -180, 180)] * 2).replace(hulls=boxes)
     bodies, q = Bodies(robot, None), quasi_random_points(robot.lower, robot.upper, 200)
     assert rows_of(robot)["base", "link_2"].state == state
-    assert bodies.free(q).all() == (state == "joined")
+    assert bodies.free(q).all() == (state == "coarse") == bool(bodies.coarse)
     assert np.array_equal(bodies.free(q, 0.02), bodies.free(q)) == kept
     assert np.isfinite(bodies.min_distance(q)[0][bodies.free(q)]).any() != kept
     bar = {"name": "bar", "size_mm": [2000 * length, 30, 100], "xyz_mm": [0, 0, 0]}
     scene = SceneFile.model_validate({"kind": "scene", "title": "made", "carried": {"boxes": [bar]}}).scene()
     carrying = Bodies(robot.replace(hulls=boxes[:2]), scene)
     assert 0 < carrying.free(q).mean() < 1  # what is carried is no housing
+
+
+def test_stages_of_a_telescope_drawn_too_large_are_not_checked_and_named():
+    """They part by 40 mm at the end of their slides, and overlap in most positions."""
+    stages = tuple(box_around(k, (-0.02, -0.02, 0.0), (0.02, 0.02, 0.16)) for k in range(3))
+    robot = made_of([("P", 0, 0, 0, 0, 100)] * 2).replace(hulls=stages)
+    bodies = Bodies(robot, None)
+    assert rows_of(robot)["base", "link_2"].state == "coarse"
+    assert bodies.coarse == (fact("link_pair", first=0, second=2),)
+    assert Open("coarse_pairs", ("base/link_2",)) in covered_collisions(robot, bodies, None).assumed
 
 
 def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes():

@@ -63,7 +63,8 @@ def test_a_rule_that_is_broken_is_named_at_its_line_and_no_other(tmp_path, code)
     assert 0 <= line - place.line <= 3  # the element begins there or a little above
     done = CliRunner().invoke(app, ["check", str(path), "--sarif", str(tmp_path / "found.sarif")])
     assert done.exit_code == int(code in WRONG)
-    (result,) = json.loads((tmp_path / "found.sarif").read_text())["runs"][0]["results"]
+    results = json.loads((tmp_path / "found.sarif").read_text())["runs"][0]["results"]
+    (result,) = (each for each in results if each["level"] != "note")
     region = result["locations"][0]["physicalLocation"]["region"]
     assert (result["ruleId"], region["startLine"]) == (code, place.line)
 
@@ -74,6 +75,20 @@ def test_rules_are_looked_at_beside_what_looks_like_xacro(tmp_path):
     broken = urdf().replace('effort="98"', 'effort="0"', 1)
     (path := tmp_path / "arm.urdf").write_text(broken.replace("</robot>", plugin))
     assert [found.code for found, _ in lint(path)] == ["urdf_no_effort"]
+
+
+@pytest.mark.parametrize("effort", [99, 100])
+def test_placeholders_are_notes_in_json_and_sarif_too(tmp_path, effort):
+    """All efforts alike, or not."""
+    (path := tmp_path / "arm.urdf").write_text(
+        re.sub('effort="9[89]"', f'effort="{effort}"', urdf()).replace('"97"', '"99"')
+    )
+    done = CliRunner().invoke(app, ["check", str(path), "--json", "--sarif", str(tmp_path / "found.sarif")])
+    named = json.loads(done.stdout)[0]["rules"]
+    results = json.loads((tmp_path / "found.sarif").read_text())["runs"][0]["results"]
+    texts = [each["message"]["text"] for each in results if (each["ruleId"], each["level"]) == ("input_note", "note")]
+    assert [each["text"] for each in named] == texts
+    assert any("effort 99" in text for text in texts) == (effort == 99)
 
 
 def test_a_check_without_a_file_is_that_of_the_study_in_the_folder(tmp_path, monkeypatch):

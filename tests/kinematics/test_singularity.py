@@ -6,13 +6,22 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.interpolate import interp1d
 
 from er3a.errors import NotWristPartitionedError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import jacobian
-from er3a.kinematics.singularity import NearSingular, characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.singularity import (
+    USUAL_NEAR,
+    NearSingular,
+    characteristic_length,
+    conditioning,
+    determinant_factors,
+    rank_losses,
+    scaled_jacobian,
+)
 from er3a.pipeline.teach.panel import panel_data
-from testing.arms import arms, joints_at_random, joints_within, make_arm, number
+from testing.arms import arms, joints_at_random, joints_within, made_of, make_arm, number
 
 
 def product_of_factors(robot, q):
@@ -55,6 +64,28 @@ def test_measures_of_an_arm_that_slides_do_not_depend_on_its_size(random):
     one, other = conditioning(small, q, 0.4), conditioning(large, np.where(small.slides, 3 * q, q), 1.2)
     np.testing.assert_allclose(other.smallest_singular_value, one.smallest_singular_value, rtol=1e-9)
     np.testing.assert_allclose(other.manipulability, one.manipulability, rtol=1e-9)
+
+
+def test_an_arm_of_five_ways_to_move_is_singular_only_where_it_loses_one(random):
+    """A telescope on a lift with a wrist: six joints, two of which slide the same way."""
+    arm = made_of(
+        [
+            ("P", 0, 0, 0, 0, 1000),
+            ("P", 0, 90, 0, 0, 130),
+            ("P", 0, 0, 0, 0, 130),
+            ("R", 0, 90, 0, -100, 200),
+            ("R", 0, 90, 0, -90, 30),
+            ("R", 0, 0, 100, -180, 180),
+        ]
+    )
+    q = random.uniform(arm.lower, arm.upper, (500, 6))
+    values = np.linalg.svd(scaled_jacobian(arm, q), compute_uv=False)
+    assert values[:, 5].max() < 1e-12
+    assert np.array_equal(USUAL_NEAR.contains(arm, q), values[:, 4] < USUAL_NEAR.smallest)
+    assert 0 < USUAL_NEAR.contains(arm, q).sum() < 50
+    t, regular = np.linspace(0, 1, 20), q[np.argsort(values[:, 4])[[-1, -2]]]
+    joints = interp1d([0, 1], regular, axis=0)
+    assert rank_losses(arm, t, joints(t), joints, 1e-3) == []
 
 
 def test_factors_change_sign_across_each_singularity(robot):

@@ -25,6 +25,7 @@ from er3a.kinematics.singularity import scaled_jacobian
 from er3a.pipeline.check import check_file, check_study
 from er3a.pipeline.cli import app
 from er3a.pipeline.new_study.arms import arm_of
+from er3a.pipeline.new_study.tasks import reach_of, scenes
 from er3a.pipeline.new_study.write import write_study
 from er3a.pipeline.stages.inverse.compute import compute as compute_inverse
 from er3a.pipeline.stages.trajectory.compute import compute as compute_trajectory
@@ -82,6 +83,17 @@ def written(request, tmp_path_factory) -> tuple[str, Path]:
     folder = tmp_path_factory.mktemp("new") / "a cell ü"
     write_study(arm_of(request.param), folder)
     return request.param, folder
+
+
+def test_no_table_stands_where_the_arm_rests():
+    """As of an arm on a stand that its file does not give."""
+    arm = load_robot("er3_600")
+    reach = reach_of(arm)
+    table, deep = scenes(arm, reach)
+    assert "boxes" in table
+    low = reach.q[reach.poses[:, 2, 3].argmin()]
+    assert scenes(arm.replace(home=low), reach) == [deep]
+    assert scenes(arm.replace(home=np.zeros(6)), reach) == [table, deep]
 
 
 @pytest.mark.long

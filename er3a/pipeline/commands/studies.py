@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import subprocess
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
@@ -14,8 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from er3a.errors import Er3aError, ResultError
+from er3a.errors import Er3aError, InputWarning, ResultError
 from er3a.files.kept_files import write_text
+from er3a.finding import fact
 from er3a.pipeline.commands import options
 from er3a.pipeline.commands.dh_options import Angles, Conventions, Lengths
 from er3a.pipeline.progress import shown_work
@@ -91,11 +93,14 @@ def check(
     from er3a.files.units import noted_doubts
     from er3a.pipeline.check import PROGRAM, check_file, rules_broken
     from er3a.pipeline.sarif import WORDS, Reported, sarif_log
+    from er3a.program_check.check_program import LocatedFinding
+    from er3a.programs.instructions import Place
 
     found, worst, rules = list[dict[str, object]](), 0, []
     for file in files or [Path()]:
         try:
-            with noted_doubts() as doubts:
+            with warnings.catch_warnings(record=True) as said, noted_doubts() as doubts:
+                warnings.simplefilter("always", InputWarning)
                 kind = check_file(file, xacro or (), base, tip)
         except Er3aError as error:
             options.print_error(error)
@@ -106,8 +111,12 @@ def check(
         more: dict[str, object] = {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
         more |= {"not_examined": [WHAT_IT_DOES]} if kind == PROGRAM else {}
         broken = rules_broken(file, kind, xacro or ())
-        rules += [Reported(*each) for each in broken]
-        named = [{"code": one.finding.code, "line": one.place.line, "text": text} for one, text in broken]
+        for each in said:
+            warnings.showwarning(each.message, each.category, each.filename, each.lineno)
+        note = LocatedFinding("note", fact("input_note"), Place(file))
+        notes = [(note, str(each.message)) for each in said if each.category is InputWarning]
+        rules += [Reported(*each) for each in broken + notes]
+        named = [{"code": one.finding.code, "line": one.place.line, "text": text} for one, text in broken + notes]
         more |= {"rules": named} if named else {}
         wrong = bool(doubts) or any(one.level == "fail" for one, _ in broken)
         found.append({"file": str(file), "in_order": not wrong, "kind": kind} | more)

@@ -29,7 +29,7 @@ STATES: dict[PairState, str] = words(
         "never": "never collide",
         "joined": "adjacent",
         "overlaps": "shapes in error",
-        "guessed": "guess in error",
+        "coarse": "shapes too coarse",
         "meets": "can collide",
         "undecided": "undecided",
         "allowed": "allowed",
@@ -49,7 +49,7 @@ TEXTS = texts(
             "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the shapes. "
             "What overlaps is not checked."
         ),
-        "why.guessed": "Shapes guessed from the table are too coarse here. Not checked: give the robot's shapes.",
+        "why.coarse": "Their shapes overlap in too many joint vectors. Not checked: give the robot closer shapes.",
         "why.meets": (
             "[{radius:?}They touch by design: left out within {radius:.0f} mm of their joint.]"
             "[{radius:?} Outside they collide at ({witness}).][{radius:?}{witness:!} Outside no collision was found.]"

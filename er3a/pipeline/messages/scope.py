@@ -71,7 +71,7 @@ ASSUMED: Mapping[str, str] = words(
         "own_accelerations": "joint accelerations",
         "tool": "no tool: the flange's centre is the tip",
         "carried": "nothing is carried",
-        "guessed_pairs": "pairs of links for which guessed shapes are too coarse",
+        "coarse_pairs": "not checked: pairs of links whose shapes are too coarse near their joints",
         "base_contacts": "the base is mounted on these solids",
         "start_branches": "the solution to start with",
         "arm_angles": "arm angle",

@@ -20,6 +20,7 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError
 from er3a.files.path_file import PathFile, ProgramPath
+from er3a.files.scene_file import SceneFile
 from er3a.files.target_file import TargetEntry
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
@@ -99,7 +100,10 @@ def reach_of(robot: Robot) -> SampledReach:
 
 
 def scenes(robot: Robot, reach: SampledReach) -> list[dict[str, Any]]:
-    """Scene files to try, the fullest first: the last is a floor below all that the arm reaches."""
+    """Scene files to try, the fullest first: the last is a floor below all that the arm reaches.
+
+    A table on the floor is no scene for an arm whose home meets it, such as one on a stand that its file does not give.
+    """
     room = ROOM_BELOW * max(1.0, reach.radius)
     low = math.floor((float(frames(robot, reach.q)[..., 2, 3].min()) - room) * 100) * 10
     deep = _scene(written_title("Floor below all that the arm reaches"), float(low))
@@ -117,7 +121,10 @@ def scenes(robot: Robot, reach: SampledReach) -> list[dict[str, Any]]:
         "rpy_deg": [0.0, 0.0, float(np.degrees(np.arctan2(reach.side[1], reach.side[0])))],
     }
     floor = _scene(written_title("Table on the floor"), round(ground - FLOOR_BELOW_MM, 1))
-    return [floor | {"boxes": [table]}, deep]
+    stood = floor | {"boxes": [table]}
+    home = robot.home
+    clear = home is None or Bodies(robot, parse(SceneFile, stood, None).scene()).free(home[None])[0]
+    return [stood, deep] if clear else [deep]
 
 
 def _foot_of(robot: Robot) -> float:

@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import regular_rank
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion, Weight
@@ -275,6 +276,7 @@ def table_data(robot: Robot) -> dict[str, Any]:
         **{key: getattr(robot, key).tolist() for key in TABLE},
         "tool": robot.last_to_tool.tolist(),
         "slides": robot.slides.tolist(),
+        "rank": regular_rank(robot),
         "coupling": None if robot.coupling is None else robot.coupling.tolist(),
         "combined": [asdict(limit) for limit in robot.combined],
     }

@@ -10,7 +10,7 @@ import numpy as np
 from er3a.by_value import frozen
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
-from er3a.collision.matrix import PairState, base_contacts
+from er3a.collision.matrix import base_contacts
 from er3a.collision.pairs import PENETRATION_TOLERANCE, label_of, link_label
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import COVERED, arm_shapes, depths_in, has_bare_tool
@@ -53,20 +53,16 @@ def covered_collisions(
     -------
     covered : links, the base and the tool count as one body each
     """
-
-    def pairs(state: PairState) -> tuple[str, ...]:
-        return tuple(f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state)
-
     arms = tuple(arms)
     tip = "tool" if robot.tool[:3, 3].any() else "flange"
     shapes, rules = arm_shapes(robot), scene.pair_rules if scene else ()
     by_scene = {frozenset((each.first, each.second)): f"{each.first}/{each.second}" for each in rules}
     bare = dict.fromkeys(name or tip for name, arm in (("", robot), *arms) if has_bare_tool(arm, scene))
-    hidden = {f"{row.first}/{row.second}" for row in bodies.matrix if row.hides}
-    allowed = [name for name in pairs("allowed") if frozenset(name.split("/")) not in by_scene and name in hidden]
+    hidden = ((row.first, row.second) for row in bodies.matrix if row.hides)
+    allowed = ("/".join(names) for names in hidden if frozenset(names) not in by_scene)
     contacts = base_contacts(robot, scene)
     with_tools = [bodies, *(bodies_of(arm, scene) for _, arm in arms)]
-    guessed = tuple(dict.fromkeys(label_of(each) for arm in with_tools for each in arm.guessed))
+    coarse = tuple(dict.fromkeys(label_of(each) for arm in with_tools for each in arm.coarse))
     shares = tuple(f"{link_label(link)}: {100 * share:.0f} %" for link, share in shapes.partial)
     uncovered = tuple(
         link_label(link) + (f": {1000 * by:.0f} mm" if np.isfinite(by) else "") for link, by in shapes.uncovered
@@ -81,7 +77,7 @@ def covered_collisions(
     )
     assumed = (
         Open("base_contacts", tuple(each.solid for each in contacts if not each.inside)),
-        Open("guessed_pairs", guessed),
+        Open("coarse_pairs", coarse),
     )
     count = robot.rows + 2
     open_links = {link_label(link) for link, _ in (*shapes.uncovered, *shapes.partial)}

@@ -1,6 +1,6 @@
 /** Joint values for a pose that a person asks for: in closed form where the arm has one here, else by iteration. */
 
-import { column, cross, dot, norm, scaled, singularValues, subtract, turnedBack } from "er3a/algebra";
+import { column, cross, dot, norm, scaled, subtract, turnedBack } from "er3a/algebra";
 import { excesses, inverse } from "er3a/inverse";
 import { frames, POSE, scaledJacobian } from "er3a/kinematics";
 
@@ -13,7 +13,6 @@ const MIN_DAMPING = 1e-13; // of the normal matrix, which is singular where the 
 const LONGEST_STEP = 0.5; // rad
 const [STALLED, PATIENCE] = [0.9, 6]; // the squared error must fall by this factor within so many iterations
 const TYPED_STARTS = 60;
-const INDEPENDENT = 1e-6; // singular value above which a direction of motion counts
 const SAME_ARM = 1e-5; // rad
 const SOME = 6; // solutions that are listed where there are infinitely many
 
@@ -21,13 +20,7 @@ const farthest = (a, b) => Math.max(...a.map((value, k) => Math.abs(value - b[k]
 const inner = (a, b) => a.reduce((sum, value, i) => sum + value * b[i], 0);
 
 /** What the iteration takes: the table, its links, a length (m), and in how many ways the joints can move the tool. */
-export function goalOf({ table, characteristic_length: length }, links) {
-  const ranks = [1, 2, 3, 4, 5, 6].map((i) => {
-    const columns = scaledJacobian(table, frames(table, links, spread(table, i)), length);
-    return singularValues(columns).filter((value) => value > INDEPENDENT).length;
-  });
-  return { table, links, length, rank: Math.max(...ranks) };
-}
+export const goalOf = ({ table, characteristic_length: length }, links) => ({ table, links, length, rank: table.rank });
 
 /** The `i`-th of evenly spread joint vectors within the limits (multiples of square roots of primes). */
 function spread(table, i) {

@@ -75,7 +75,8 @@ export function jacobian(table, T) {
 /** Measures of the Jacobian with its linear rows divided by a characteristic length (m), columns of slides times it [3]. */
 export function conditioning(table, T, length) {
   const columns = scaledJacobian(table, T, length);
-  const values = singularValues(columns.length > 6 ? POSE.map((r) => columns.map((entries) => entries[r])) : columns);
+  const rows = columns.length > 6 ? POSE.map((r) => columns.map((entries) => entries[r])) : columns;
+  const values = singularValues(rows).slice(0, table.rank);
   const singular = values.at(-1) <= 6 * Number.EPSILON * values[0];
   return {
     manipulability: values.reduce((product, value) => product * value, 1),

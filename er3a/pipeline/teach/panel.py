@@ -351,7 +351,7 @@ def singular_sets(robot: Robot) -> dict[str, Any] | None:
 def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
     """The bodies whose distances the panel watches and their pairs, as ``clearance.js`` takes them; SI units."""
     found = Bodies(robot, scene)
-    layout, left_out = found.layout, found.in_error + found.guessed
+    layout, left_out = found.layout, found.in_error + found.coarse
     shapes = shapes_assumed(robot, 0.0, {})
     return {
         "near": NEAR_TOUCH,

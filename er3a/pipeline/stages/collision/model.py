@@ -93,7 +93,7 @@ class MatrixRows(Table):
 
     first: Texts = column("the body nearer to the base")
     second: Texts = column("the body farther out")
-    state: Texts = column("never, joined, overlaps, meets, undecided, allowed or watched")
+    state: Texts = column("never, joined, overlaps, coarse, meets, undecided, allowed or watched")
     watched: Flags = column("whether distances of the pair are measured")
     least_mm: Reals = column("of pairs that never meet, a proven lower bound of their distance")
     left_out_mm: Reals = column("radius of the region around the joint that is left out; 0 where none is")
@@ -158,4 +158,4 @@ class CollisionResults(Results):
 
 
 RESULTS = CollisionResults
-STATES: tuple[PairState, ...] = ("overlaps", "guessed", "meets", "undecided", "watched", "joined", "allowed", "never")
+STATES: tuple[PairState, ...] = ("overlaps", "coarse", "meets", "undecided", "watched", "joined", "allowed", "never")

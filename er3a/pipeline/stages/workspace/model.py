@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from er3a.by_value import frozen
 from er3a.finding import Finding, is_one
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
-from er3a.kinematics.forward import forward, jacobian
+from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import conditioning
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Table, Texts, column, lists, vector
@@ -442,13 +443,9 @@ def cloud(robot: Robot, q: Reals) -> Cloud:
 
     Returns
     -------
-    cloud : m in the base frame; |det J|, for other than six joints the product of the singular values
+    cloud : m in the base frame; the product of the singular values, of six joints |det J|
     """
-    J = jacobian(robot, q)
-    square = robot.joints == J.shape[-2]
-    # For a square Jacobian the product of the singular values is |det J|.
-    measure = np.abs(np.linalg.det(J)) if square else np.linalg.svd(J, compute_uv=False).prod(axis=-1)
-    return Cloud(forward(robot, q)[:, :3, 3], measure)
+    return Cloud(forward(robot, q)[:, :3, 3], conditioning(robot, q, 1.0).manipulability)
 
 
 def proof(proven: Proven) -> ProofCells:
