@@ -32,8 +32,7 @@ from er3a.errors import PathError
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
 from er3a.planning.motion_faults import over_limits
-from er3a.planning.piecewise import PiecewiseMotion
-from er3a.planning.profiles import FromRestToRest, Rates
+from er3a.planning.profiles import FromRestToRest
 from er3a.planning.sequences import JointSequence, joint_sequence
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, joined, standing
 from er3a.robots.joint_limits import limits_exceeded
@@ -145,45 +144,6 @@ def _clear_at_ends(task: PlanningTask, start: Reals, end: Reals) -> float | Find
                 why=fact("pair_overlaps", pair=task.bodies.pairs[pair], depth_mm=-float(distance) * 1000),
             )
     return float(clear.min())
-
-
-@by_identity
-class PlannedMove:
-    """A planned motion as a move of the joints, as :class:`er3a.planning.moves.JointMove` is one."""
-
-    curve: PiecewiseMotion
-
-    @property
-    def duration(self) -> float:
-        """Duration, s."""
-        return self.curve.duration
-
-    def joints(self, t: Reals) -> Rates:
-        """Angles, velocities and accelerations at times.
-
-        Parameters
-        ----------
-        t : (...,), s, from 0 to ``duration``
-
-        Returns
-        -------
-        q, velocity, acceleration : (..., n), rad, rad/s and rad/s^2
-
-        Raises
-        ------
-        Er3aError
-            for times beyond start and end
-        """
-        return self.curve.rates(t)
-
-    def polynomials(self) -> PiecewiseMotion:
-        """The motion itself, piece by piece.
-
-        Returns
-        -------
-        motion : rad and s
-        """
-        return self.curve
 
 
 def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | Finding:

@@ -20,9 +20,9 @@ from er3a.planning.avoidance import strategies
 from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare_strategies, deviation
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
 from er3a.planning.names import StrategyName
+from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.planning.tool_curve import curve_of
 from er3a.robots.joint_limits import within

@@ -14,7 +14,7 @@ from er3a.finding import Finding
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
-from er3a.planning.motion_faults import SingularEvent
+from er3a.planning.singular_events import SingularEvent
 from er3a.planning.timing import JointLimits, Timed, fastest, nodes_along, straight
 from er3a.robots.robot import Robot
 

@@ -47,8 +47,9 @@ from er3a.planning.avoidance.strategies import (
     compare_strategies,
     deviation,
 )
-from er3a.planning.motion_faults import Interval, SingularEvent
+from er3a.planning.motion_faults import Interval
 from er3a.planning.names import PATH_VERDICTS, TOO_FAST, UNFOLLOWED, PathVerdict, StrategyName
+from er3a.planning.singular_events import SingularEvent
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import WayAround, way_between
 from er3a.robots.joint_limits import shown, speeds_given, within
@@ -116,7 +117,7 @@ class AvoidanceTask(MotionTask):
         met = {each: _meets(own, margin) for each, own in along.items()}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
-        chosen = best(free, meets, motion.built.duration)
+        chosen = best(free, meets, motion.curve.duration)
         tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
         return Avoided(
             tried=tried,
@@ -144,7 +145,7 @@ class AvoidanceTask(MotionTask):
 
     def _planned(self, motion: Motion) -> list[StrategyResult]:
         """The planner's motion between the ends of a path, where both can be reached."""
-        tool = motion.tool(np.array([0.0, motion.built.duration]))
+        tool = motion.tool(np.array([0.0, motion.curve.duration]))
         ends = [self._end(q, T) for q, T in zip(motion.q[[0, -1]], tool)]
         found = way_between(self, *ends)
         if not isinstance(found, WayAround):
@@ -231,7 +232,7 @@ class _ToolPath:
         -------
         T : T_base_tool (..., 4, 4), m
         """
-        return self.motion.tool(np.asarray(progress) * self.motion.built.duration)
+        return self.motion.tool(np.asarray(progress) * self.motion.curve.duration)
 
 
 def speed_ratio(velocity: Reals, limits: JointLimits) -> Reals:
@@ -331,7 +332,7 @@ def path_summary(
         outcomes=found.outcomes,
         expect=entry.expected,
         in_joint_space=followed is None,
-        duration_s=float(motion.built.duration),
+        duration_s=float(motion.curve.duration),
         samples=entry.samples,
         length_m=float(motion.way(motion.samples[-1:])[0]),
         branches=tuple(labels[slot] for slot in slots),
