@@ -20,7 +20,7 @@ from er3a.kinematics.wrist_partitioned import has_branches, wrist_partition_miss
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, Status, Verdict
-from er3a.pipeline.scope import OF_MOTIONS, Check, Coverage, Open, by_reason, coverages
+from er3a.pipeline.scope import CHECKS_OF_MOTIONS, Check, Coverage, Open, by_reason, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.covered import Covered, assumed_rates, assumed_tool, covered_collisions, gaps_of_orientations
 from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
@@ -518,7 +518,7 @@ def _checked(
     of = followed, followed
     gaps = (*seen.gaps, *by_reason(rest))
     gaps += (Open("not_followed", lost),) if lost else ()
-    checks: dict[Check, tuple[int, int]] = dict.fromkeys((*OF_MOTIONS, "limits", "singularity"), of)
+    checks: dict[Check, tuple[int, int]] = dict.fromkeys(CHECKS_OF_MOTIONS, of)
     return coverages({**checks, "reach": (followed, followed + len(lost)), **seen.asked}, gaps)
 
 
