@@ -298,7 +298,7 @@ def curve_of(path: MotionPath) -> PiecewiseMotion:
     """The motion in time: cubics in the share of the way, by its law."""
     law, share = path.law, path.share
     if len(share) == 1:
-        return standing(path.q[0], 0.0).curve
+        return standing(path.q[0], 0.0)
     times = law.times(share)
     ramps = law.duration * np.array([law.ramp, 1 - law.ramp])
     times = np.union1d(times, ramps[ramps < times[-1]])

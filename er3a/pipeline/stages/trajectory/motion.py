@@ -292,11 +292,11 @@ def _planned(task: PlanningTask, entry: PlannedEntry, command: PlanCommand, chec
     starts, ends = (joints_at(robot, end) for end in (command.start, command.end))
     found = way_between(task, starts, ends)
     if isinstance(found, WayAround):
-        curve, reason = found.motion.curve, None
+        curve, reason = found.motion, None
     elif len(starts) and len(ends):
-        curve, reason = straight(starts[0], ends[0], task.limits).curve, found
+        curve, reason = straight(starts[0], ends[0], task.limits), found
     else:
-        curve, reason = standing(np.clip(np.zeros(len(robot.lower)), robot.lower, robot.upper), 1.0).curve, found
+        curve, reason = standing(np.clip(np.zeros(len(robot.lower)), robot.lower, robot.upper), 1.0), found
     motion = _joint_motion(robot, entry, Built(), curve, *_times(entry, curve.duration, checks_per_sample))
     return replace(motion, not_planned=reason)
 
