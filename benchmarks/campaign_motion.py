@@ -81,7 +81,7 @@ def query_rows(name: str) -> list[str]:
             other += reference
             both += solved and reference
             if isinstance(way, WayAround):
-                distance = float(apart.least(way.motion.curve.joints(np.linspace(0, way.motion.duration, DENSE))).min())
+                distance = float(apart.least(way.motion.joints(np.linspace(0, way.motion.duration, DENSE))).min())
                 touching, least = touching + (distance <= 0), min(least, distance)
         rows.append(
             f"| {name} | {title} | {QUERIES} | {found} | {other} | {100.0 * both / max(other, 1):.1f} % "

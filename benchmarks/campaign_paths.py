@@ -18,8 +18,8 @@ from er3a.kinematics.singularity import characteristic_length, conditioning, det
 from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare_strategies
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
+from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.planning.tool_curve import curve_of
 from testing.evidence import sized

@@ -332,7 +332,7 @@ def other_rows(random) -> list[str]:
         return found.duration
 
     def ours(start: np.ndarray, end: np.ndarray) -> float:
-        return float(straight(start, end, limits).t[-1])
+        return float(straight(start, end, limits).duration)
 
     least = least_times(
         MOVES, lambda: [theirs(*move) for move in moves], lambda: [ours(*move) for move in moves], rounds=3

@@ -15,8 +15,8 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import TYPES, NearSingular
 from er3a.kinematics.solutions import branch_labels
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
+from er3a.planning.singular_events import singular_events
 from er3a.planning.tool_curve import curve_of
 
 REAL = np.longdouble

@@ -9,9 +9,10 @@ import numpy as np
 
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import TYPES, NearSingular, determinant_factors, factor_of
+from er3a.numerics.arrays import runs
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import SingularEvent, runs, singular_events
 from er3a.planning.moves import JointMove, line
+from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.planning.tool_curve import curve_of
 
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)

@@ -5,29 +5,22 @@ type of singularity: *wrist* (axes 4 and 6 align), *elbow* (arm straight or fold
 in the plane of axis 1 and the direction of axis 2, where turning joint 1 can't move it). So is that of an arm with
 parallel axes 2, 3 and 4: there the wrist centre is where axes 5 and 6 meet, and the forearm ends on axis 4.
 
-Along a motion any arm is singular where its Jacobian loses rank. Columns of prismatic joints, and linear rows, are
-scaled by the arm's length. With six joints the determinant changes sign where the motion crosses the singular set. With
-more, or fewer, rank loss is judged by the smallest singular value. Between two samples nothing is missed: turning joint
-j by d changes the scaled Jacobian by at most ``B_j d`` in norm, and no singular value by more [3]_, so an interval
-whose ends have larger ones than its joints' travel can take away is clear; others are halved. Axes are named by the
-smallest set of columns that are dependent there.
+Any arm is singular where its Jacobian loses rank. Columns of prismatic joints, and linear rows, are scaled by the arm's
+length. Axes are named by the smallest set of columns that are dependent there.
 
 References
 ----------
 .. [1] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, section 3.3.
 .. [2] T. Yoshikawa, "Manipulability of robotic mechanisms", Int. J. Robotics Research 4(2), 1985.
-.. [3] R. A. Horn, C. R. Johnson, *Matrix Analysis*, 2nd ed., corollary 7.3.5 (Weyl).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
-import scipy
 
 from er3a.by_value import Displayed, Sheet, by_identity, frozen
 from er3a.geometry.vectors import Vector, cross, dot, subtract
@@ -40,7 +33,7 @@ from er3a.kinematics.wrist_partitioned import (
     wrist_partition_missing,
     wrist_partitioned_arm,
 )
-from er3a.numerics.arrays import Flags, Reals, runs
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.robot import Robot, derived
@@ -234,30 +227,7 @@ def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
 
 
 DEPENDENT = 1e-6  # smallest singular value of columns that count as dependent, relative to that of the event
-SHORTEST, EDGE = 1e-9, 1e-4  # shares of the motion
 TRIED = 16  # joint vectors in which an arm's rank is looked for
-MAX_SAMPLES = 200_000  # of a motion; beyond that it is judged as it is sampled
-TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
-
-
-@frozen
-class RankLoss:
-    """A stretch of a motion with a nearly dependent Jacobian.
-
-    Attributes
-    ----------
-    t, until : s; equal where the motion only crosses
-    crossing : whether the determinant changes sign (six joints), or the value falls to rounding
-    smallest : minimum of the smallest singular value in the stretch (linear rows over the arm's length)
-    at : s, where that is; axes : numbers from 1 of the axes that become dependent there
-    """
-
-    t: float
-    until: float
-    crossing: bool
-    smallest: float
-    at: float
-    axes: tuple[int, ...]
 
 
 def scaled_jacobian(robot: Robot, q: Reals, length: float | None = None) -> Reals:
@@ -294,8 +264,17 @@ def regular_rank(robot: Robot) -> int:
     return int(np.linalg.matrix_rank(J, DEPENDENT).max())
 
 
-def _smallest(robot: Robot, J: Reals) -> Reals:
-    """Smallest singular value (N,) of scaled Jacobians (N, 6, n), among those that are not 0 everywhere."""
+def smallest_value(robot: Robot, J: Reals) -> Reals:
+    """Smallest singular value of scaled Jacobians, among those that are not 0 in every pose.
+
+    Parameters
+    ----------
+    J : (..., 6, n), see :func:`scaled_jacobian`
+
+    Returns
+    -------
+    smallest : (...), without unit
+    """
     values = np.linalg.svd(J, compute_uv=False)
     return np.asarray(values[..., regular_rank(robot) - 1], dtype=float)
 
@@ -326,111 +305,6 @@ def change_per_joint(robot: Robot) -> Reals:
     reach = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum() + slide.sum()) / arm_length(robot)
     columns = np.sqrt(robot.joints * (1.0 + (2.0 * reach) ** 2))
     return np.asarray(columns * np.abs(robot.joint_to_row).sum(axis=0))
-
-
-def rank_losses(
-    robot: Robot,
-    t: Reals,
-    q: Reals,
-    joints: Callable[[Reals], Reals],
-    threshold: float,
-    speed: Reals | None = None,
-) -> list[RankLoss]:
-    """All stretches in which the smallest singular value falls below a threshold, and all changes of the sign of det.
-
-    Parameters
-    ----------
-    t : (N,), s, rising
-    q : (N, n), rad or m, NaN where unreachable
-    joints : joint values (k, n) at times (k,) within reach
-    threshold : of the smallest singular value of :func:`scaled_jacobian`
-    speed : (n,), maximum joint speeds of the motion, rad/s or m/s, with which nothing between samples is missed; None:
-        as the samples show, times 1.5
-
-    Returns
-    -------
-    losses : by time (s)
-    """
-    found: list[RankLoss] = []
-    for first, last in runs(np.isfinite(q[:, 0])):
-        times, values = t[first:last], q[first:last]
-        if len(times) < 2:
-            continue
-        times, values = _refined(robot, times, values, joints, threshold=threshold, speed=speed, duration=t[-1] - t[0])
-        found += _stretches(robot, times, values, joints, threshold)
-    return sorted(found, key=lambda loss: loss.t)
-
-
-def _smallest_and_sign(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
-    """Smallest singular value (N,) of the scaled Jacobian, and its determinant's sign (N,), 1 unless six joints."""
-    J = scaled_jacobian(robot, q)
-    full = robot.joints == regular_rank(robot) == 6
-    return _smallest(robot, J), np.asarray(np.sign(np.linalg.det(J))) if full else np.ones(len(q))
-
-
-def _refined(
-    robot: Robot,
-    t: Reals,
-    q: Reals,
-    joints: Callable[[Reals], Reals],
-    *,
-    threshold: float,
-    speed: Reals | None,
-    duration: float,
-) -> tuple[Reals, Reals]:
-    """Samples between which the smallest singular value stays above the threshold unless an end is below it, but for
-    dips of less than 1e-4 of the motion that do not reach 0."""
-    per_joint = change_per_joint(robot) / np.where(robot.slides, arm_length(robot), 1.0)
-    smallest, sign = _smallest_and_sign(robot, q)
-    while len(t) < MAX_SAMPLES:
-        span = np.diff(t)
-        travel = np.abs(np.diff(q, axis=0)) * TRAVEL if speed is None else span[:, None] * speed
-        # from the nearer end at most half the interval away
-        left = np.minimum(smallest[:-1], smallest[1:]) - 0.5 * travel @ per_joint
-        alike = sign[:-1] == sign[1:]
-        below = (smallest[:-1] <= threshold) & (smallest[1:] <= threshold) & alike
-        # an interval that may hold a zero is halved to rounding, one that may only dip below the threshold to EDGE
-        finest = np.where(below | (alike & (left > 0.0)), EDGE, SHORTEST) * duration
-        wide = (left <= threshold) & (span > finest)
-        if not wide.any():
-            break
-        middle = 0.5 * (t[:-1] + t[1:])[wide]
-        at, found = np.searchsorted(t, middle), joints(middle)
-        values = _smallest_and_sign(robot, found)
-        t, q = np.insert(t, at, middle), np.insert(q, at, found, axis=0)
-        smallest, sign = np.insert(smallest, at, values[0]), np.insert(sign, at, values[1])
-    return t, q
-
-
-def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals], threshold: float) -> list[RankLoss]:
-    """Stretches of samples below the threshold or next to a change of sign, with their minimum and dependent axes."""
-    smallest, sign = _smallest_and_sign(robot, q)
-    changes = np.flatnonzero(sign[:-1] * sign[1:] < 0)
-    low = smallest <= threshold
-    for i in changes:
-        # A change of sign is a crossing, however large the value at both samples is.
-        low[i if smallest[i] < smallest[i + 1] else i + 1] = True
-    found = []
-    for first, last in runs(low):
-        best = first + int(smallest[first:last].argmin())
-        begin, end = t[max(best - 1, 0)], t[min(best + 1, len(t) - 1)]
-        crossing = bool(np.any((changes >= first - 1) & (changes < last)))
-        at, value = float(t[best]), float(smallest[best])
-        if end > begin:
-
-            def size(time: float) -> float:
-                """Smallest singular value at a time, s."""
-                return float(_smallest_and_sign(robot, joints(np.array([time])))[0][0])
-
-            near = scipy.optimize.minimize_scalar(
-                size, bounds=(begin, end), method="bounded", options={"xatol": 1e-12 * t[-1]}
-            )
-            if near.fun < value:
-                at, value = float(near.x), float(near.fun)
-        axes = dependent_axes(robot, joints(np.array([at]))[0])
-        met = crossing or value < 1e-9
-        found.append(RankLoss(float(t[first]), float(t[last - 1]), met, 0.0 if met else value, at, axes))
-    return found
 
 
 def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
@@ -533,7 +407,7 @@ class NearSingular:
         margin : (N,), below 1 is near; -1 where joint values are NaN, for unreachable poses
         """
         if not has_branches(robot):
-            smallest = _smallest(robot, scaled_jacobian(robot, q))
+            smallest = smallest_value(robot, scaled_jacobian(robot, q))
             return np.asarray(np.nan_to_num(smallest / self.smallest, nan=-1.0))
         ratios = self.ratios(determinant_factors(robot, q))
         return np.where(np.isnan(ratios[0]), -1.0, ratios.min(axis=0))

@@ -66,6 +66,8 @@ GAPS: Mapping[str, Check] = {
 
 OF_MOTIONS: tuple[Check, ...] = ("reach", "rates", "program_lines")
 """What has to be known of a motion before anything else can be said of it."""
+CHECKS_OF_MOTIONS: tuple[Check, ...] = (*OF_MOTIONS, "limits", "singularity")
+"""What each motion of a path or program that is followed is checked for, but for collisions."""
 
 
 @frozen

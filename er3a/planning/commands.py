@@ -22,7 +22,6 @@ from er3a.planning.moves import JointMove, Segment, ToolPath, line, rotation_bet
 from er3a.planning.profiles import Ends, LegTimes, Times
 from er3a.planning.sequences import TURN_LENGTH, JointSequence, arc, joint_sequence, segment_path
 from er3a.planning.stated_rates import StatedMotion, StatedRates, stated_motion
-from er3a.planning.way_around import PlannedMove
 from er3a.robots.robot import Robot
 
 
@@ -193,7 +192,7 @@ GEOMETRY = 1.0  # s; a segment's own duration is of no account in a sequence
 
 @by_identity
 class Built:
-    """A path, ready to be carried out.
+    """A path, ready to be carried out; of a motion that is planned neither ``joints`` nor ``tool``.
 
     Attributes
     ----------
@@ -206,7 +205,7 @@ class Built:
     turns_open : numbers of segments that turn the tool by half a turn, and nobody said which way
     """
 
-    joints: JointMove | JointSequence | StatedMotion | PlannedMove | None = None
+    joints: JointMove | JointSequence | StatedMotion | None = None
     tool: ToolPath | None = None
     q_start: Reals | None = None
     start_slot: int | None = None

@@ -1,17 +1,13 @@
-"""The faults of a motion, with their times: singular poses, joint limits, reach, speeds, accelerations, jerk.
+"""The faults of a motion, with their times: joint limits, reach, speeds, accelerations, jerk.
 
 A motion is polynomials of the joints in time, whatever made it: a joint move, a table, a planned path, a path of the
 tool (:mod:`er3a.planning.tool_curve`). The checks are exact: what is compared with a limit is a Chebyshev series, which
 is monotone between the roots of its slope.
-
-The determinant's factors (:func:`er3a.kinematics.singularity.determinant_factors`) are signed distances from the three
-singular sets, those of wrist and elbow angles, whose sines are smooth. Over turns so short that a series of degree 24
-meets a sine to rounding, sines and shoulder distance become series too. A change of sign is a crossing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Literal, Protocol, TypeVar
 
@@ -19,64 +15,15 @@ import numpy as np
 
 from er3a.by_value import by_identity, frozen
 from er3a.finding import Finding, fact, turned_or_moved
-from er3a.kinematics import singularity
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
+from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
-from er3a.planning.piecewise import Pieces, PiecewiseMotion, evaluated, interpolated
+from er3a.planning.piecewise import Pieces, PiecewiseMotion
 from er3a.robots.joint_limits import limit_amounts
 from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
-
-ON_SET = 1e-9  # rad or m: this near counts as on the singular set
-EDGE = 1e-3  # rad or m: a branch that ends this near to a singular set ends on it
-SAME_EVENT = 1e-8  # share of the duration
-LONG_STAY = 0.01  # share of the duration
-
-
-@frozen
-class SingularEvent:
-    """A pass through, or next to, a singular set.
-
-    Attributes
-    ----------
-    t, until : s; they differ where the motion stays on the set
-    crossing : whether the motion meets the set; else it passes by at ``distance``
-    distance : rad (wrist, elbow) or m (shoulder), of arms without these sets the smallest singular value; 0 for a
-        crossing
-    axes : of arms without these sets, numbers of the axes that become dependent
-    """
-
-    t: float
-    until: float
-    type: singularity.EventType
-    crossing: bool
-    distance: float
-    axes: tuple[int, ...] = ()
-
-
-def merged(spans: list[tuple[float, float]], gap: float) -> list[tuple[float, float]]:
-    """Join spans that are no farther from each other than a gap.
-
-    Parameters
-    ----------
-    spans : (start, end) pairs, sorted by their starts, in s or any other unit
-    gap : in the same unit
-
-    Returns
-    -------
-    spans : sorted, with larger gaps than that between them
-    """
-    kept: list[tuple[float, float]] = []
-    for start, until in spans:
-        if kept and start - kept[-1][1] <= gap:
-            kept[-1] = (kept[-1][0], max(until, kept[-1][1]))
-        else:
-            kept.append((start, until))
-    return kept
-
 
 RATES = {"too_fast": "/s", "acceleration_too_great": "/s²", "jerk_too_great": "/s³"}
 """Codes of what exceeds a limit of a rate, and what the rate is by, in the order of the derivative."""
@@ -193,26 +140,21 @@ class RateLimit:
         """(n,), the limit with what rounding may add to it; rad/s, rad/s^2 or rad/s^3."""
         return self.most * (1 + OVER)
 
+    def cause(self, joint: int, most: float) -> Finding:
+        """The finding for a joint that exceeds this limit.
 
-def rate_interval(limit: RateLimit, joint: int, start: float, end: float, most: float, worst: float) -> Interval:
-    """A stretch on which a joint exceeds a limit of its rate.
+        Parameters
+        ----------
+        joint : number from 0
+        most : largest size of the rate, rad/s^k or m/s^k; infinite for a step of the acceleration
 
-    Parameters
-    ----------
-    limit : of all joints
-    joint : number from 0
-    start, end : s
-    most : largest size of the rate there, rad/s^k or m/s^k; infinite for a step of the acceleration
-    worst : s, when it is met
-
-    Returns
-    -------
-    interval : its cause names the joint from 1, in degrees, or in mm for a sliding joint
-    """
-    slides = limit.sliding is not None and bool(limit.sliding[joint])
-    needed, allowed = (np.array([most, limit.most[joint]]) * (1000.0 if slides else np.degrees(1.0))).tolist()
-    cause = rate_fault(limit.order, joint + 1, needed, allowed, slides, limit.assumed[joint])
-    return Interval(start, end, cause, worst)
+        Returns
+        -------
+        cause : it names the joint from 1, in degrees, or in mm for a sliding joint
+        """
+        slides = self.sliding is not None and bool(self.sliding[joint])
+        needed, allowed = (np.array([most, self.most[joint]]) * (1000.0 if slides else np.degrees(1.0))).tolist()
+        return rate_fault(self.order, joint + 1, needed, allowed, slides, self.assumed[joint])
 
 
 def joints_of(cause: Finding) -> tuple[int, ...]:
@@ -364,10 +306,10 @@ def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval]:
     for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
         for sign in (1.0, -1.0) if size[j] > limit.allowed[j] else ():
             stretches = motion.of_joint(series, j, sign).above(limit.allowed[j])
-            found += [rate_interval(limit, j, *stretch) for stretch in stretches]
+            found += [Interval(start, end, limit.cause(j, most), worst) for start, end, most, worst in stretches]
         if limit.order == 3:
             steps = motion.times[motion.steps[:, j] > limit.step_allowed[j]]
-            found += [rate_interval(limit, j, t, t, np.inf, t) for t in steps.tolist()]
+            found += [Interval(t, t, limit.cause(j, np.inf), t) for t in steps.tolist()]
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
@@ -384,108 +326,25 @@ def over_limits(
 
     Returns
     -------
-    intervals : of limits of joints, then of each rate, each sorted by start (s)
+    intervals : of limits of joints, then of each rate, each sorted by start (s), then gaps of the motion
     """
     return [
         *limit_intervals(robot, motion, tolerance),
         *(part for limit in rates for part in rate_intervals(motion, limit)),
+        *open_stretches(motion),
     ]
 
 
-LONGEST_TURN = 1.0  # rad, of all joints that count, within one series of the distances
-DEGREE = 24  # by which a sine of so short a turn is met to rounding
-SAMPLES = 500  # of a motion of an arm without the three sets
-
-
-def singular_events(robot: Robot, motion: PiecewiseMotion, near: singularity.NearSingular) -> list[SingularEvent]:
-    """All crossings of singular sets, and the nearest pass of each stretch below its type's threshold.
-
-    Of arms without the three sets the losses of rank are reported (:func:`er3a.kinematics.singularity.rank_losses`).
+def open_stretches(motion: PiecewiseMotion) -> list[Interval]:
+    """The gaps of a motion: where the closed form could not be met, or does not reach.
 
     Parameters
     ----------
-    motion : of n joints, rad or m
-    near : distances below which a pass is reported, rad, and m for the shoulder
+    motion : of n joints, with NaN rates in the gaps
 
     Returns
     -------
-    events : sorted by time (s), then by type
+    intervals : from start to end of each gap, s
     """
-    if not has_branches(robot):
-        t = np.union1d(motion.times, np.linspace(0.0, motion.duration, SAMPLES))
-        return [
-            SingularEvent(loss.t, loss.until, "dependent_axes", loss.crossing, loss.smallest, loss.axes)
-            for loss in singularity.rank_losses(robot, t, motion.joints(t), motion.joints, near.smallest)
-        ]
-    times, values = _distances(robot, motion)
-    found: list[SingularEvent] = []
-    for kind, series in zip(singularity.TYPES, values):
-        if kind == "shoulder":
-            found += _events(Pieces(times, series), kind, near.shoulder_m)
-            continue
-        for event in _events(Pieces(times, series), kind, np.sin(near.of(kind))):
-            found.append(replace(event, distance=float(np.arcsin(min(event.distance, 1.0)))))
-    return sorted(found, key=lambda event: (event.t, singularity.TYPES.index(event.type)))
-
-
-def _distances(robot: Robot, motion: PiecewiseMotion) -> tuple[Reals, Reals]:
-    """Times (k + 1,), s, between which turns are short; series (3, k, d + 1) of the two sines and the shoulder's m."""
-    turning = (motion.angle[:, 1:] @ robot.joint_to_row.T)[..., 1:5]  # the first and the last axis turn all there is
-    turned = 2 * np.nan_to_num(np.abs(turning)).sum(axis=(1, 2))
-    parts = np.maximum(1, np.ceil(turned / LONGEST_TURN)).astype(int)
-    piece = np.repeat(np.arange(len(parts)), parts)
-    within = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
-    starts = motion.times[piece] + np.diff(motion.times)[piece] * within / parts[piece]
-    times = np.append(starts, motion.times[-1])
-    x = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
-    inner = -1 + 2 * (within[:, None] + (x + 1) / 2) / parts[piece][:, None]
-    factors = singularity.determinant_factors(robot, evaluated(motion.angle, piece[:, None], inner))
-    values = np.stack([np.sin(factors.wrist), np.sin(factors.elbow), factors.shoulder], axis=-1)
-    return times, np.moveaxis(interpolated(values), 2, 0)
-
-
-def _events(distance: Pieces, kind: singularity.SingularityType, near: float) -> list[SingularEvent]:
-    """Crossings, and the nearest passes, of one signed distance."""
-    low, high = distance.range
-    gap = np.isnan(low)
-    duration = float(distance.times[-1])
-    events: list[SingularEvent] = []
-    for first, last in runs((low < near) & (high > -near)):
-        nodes = [distance.nodes(i) for i in range(first, last)]
-        t = np.concatenate([nodes[0][0][:1], *(times[1:] for times, _ in nodes)])
-        f = np.concatenate([nodes[0][1][:1], *(values[1:] for _, values in nodes)])
-        for end, beside in ((0, first - 1), (-1, last)):  # a branch ends on the set where it ends near to it
-            if 0 <= beside < len(gap) and gap[beside] and abs(f[end]) < EDGE:
-                f[end] = 0.0
-        piece = np.repeat(np.arange(first, last), [len(times) - 1 for times, _ in nodes])
-        crossed = (f[:-1] * f[1:] < 0) & (np.minimum(np.abs(f[:-1]), np.abs(f[1:])) > ON_SET)
-        met = [_stay(t, f, a, b, duration) for a, b in runs(np.abs(f) <= ON_SET)]
-        for k in np.flatnonzero(crossed).tolist():
-            root = distance.root(int(piece[k]), t[k], t[k + 1], 0.0)
-            met.append((root, root))
-        spans = merged(sorted(met), SAME_EVENT * duration)
-        events += [SingularEvent(float(a), float(b), kind, True, 0.0) for a, b in spans]
-        passed = _passes(np.abs(f), crossed, near)
-        events += [SingularEvent(float(t[k]), float(t[k]), kind, False, float(abs(f[k]))) for k in passed]
-    return events
-
-
-def _stay(t: Reals, f: Reals, a: int, b: int, duration: float) -> tuple[float, float]:
-    """When nodes a to b - 1, which lie on the set to rounding, meet it: a span only if it is a long one."""
-    if t[b - 1] - t[a] > LONG_STAY * duration:
-        return t[a], t[b - 1]
-    at = 0 if a == 0 else len(t) - 1 if b == len(t) else a + int(np.argmin(np.abs(f[a:b])))
-    return t[at], t[at]
-
-
-def _passes(size: Reals, crossed: Flags, near: float) -> Iterator[int]:
-    """The nearest node of each stretch below the threshold that meets no set; monotone between nodes."""
-    below = size < near
-    joined = below[:-1] & below[1:] & ~crossed
-    for a, b in runs(np.concatenate([joined, [False]])):
-        below[a : b + 1] = False
-        if size[a : b + 1].min() > ON_SET and not (crossed[max(a - 1, 0) : b + 1]).any():
-            yield a + int(np.argmin(size[a : b + 1]))
-    for k in np.flatnonzero(below).tolist():
-        if size[k] > ON_SET and not crossed[max(k - 1, 0) : k + 1].any():
-            yield k
+    times = motion.times.tolist()
+    return [Interval(times[a], times[b], fact("undecided")) for a, b in runs(np.isnan(motion.velocity[:, 0, 0]))]

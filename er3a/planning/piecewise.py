@@ -277,6 +277,11 @@ class PiecewiseMotion(ByValue, Displayed):
         joints = range(series.shape[2])
         return np.array([max(self.of_joint(series, j, sign).peak()[0] for sign in (1.0, -1.0)) for j in joints])
 
+    @cached_property
+    def max_rates(self) -> tuple[Reals, Reals]:
+        """Maximum speed (n,) and acceleration (n,) of each joint, rad/s and rad/s^2."""
+        return self.max_abs(self.velocity), self.max_abs(self.acceleration)
+
     def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
         """Bounds of the sizes of velocity and acceleration between times.
 

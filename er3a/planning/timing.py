@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, by_identity, frozen
+from er3a.by_value import ByValue, frozen
 from er3a.errors import Er3aError
 from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Flags, Reals
@@ -78,67 +78,19 @@ class JointLimits(ByValue):
         ]
         return (*found, *([] if self.jerk is None else [RateLimit(3, self.jerk, none, step, self.sliding)]))
 
-
-@by_identity
-class Timed:
-    """A motion of the joints.
-
-    Attributes
-    ----------
-    curve : the motion itself
-    t : (N,), s, rising from 0: where its pieces meet
-    q, velocity, acceleration : (N, n), rad, rad/s, rad/s^2, there
-    """
-
-    curve: PiecewiseMotion
-
-    @cached_property
-    def _rates(self) -> Rates:
-        return self.curve.rates(self.t)
-
-    @property
-    def t(self) -> Reals:
-        """(N,), s, rising from 0: where the pieces meet."""
-        return self.curve.times
-
-    @property
-    def q(self) -> Reals:
-        """(N, n), rad, at the times ``t``."""
-        return self._rates[0]
-
-    @property
-    def velocity(self) -> Reals:
-        """(N, n), rad/s, at the times ``t``."""
-        return self._rates[1]
-
-    @property
-    def acceleration(self) -> Reals:
-        """(N, n), rad/s^2, at the times ``t``."""
-        return self._rates[2]
-
-    @property
-    def duration(self) -> float:
-        """Duration, s."""
-        return self.curve.duration
-
-    def ratios(self, limits: JointLimits) -> tuple[float, float]:
-        """Largest ratios of rates to their limits, over all joints and the whole curve.
+    def ratios(self, motion: PiecewiseMotion) -> tuple[float, float]:
+        """Largest ratios of a motion's rates to these limits, over all joints and all of it.
 
         Parameters
         ----------
-        limits : of speed (rad/s) and acceleration (rad/s^2), each (n,)
+        motion : of n joints, rad or m
 
         Returns
         -------
         speed, acceleration : 1 for a joint that is as fast as its limit
         """
-        speed, acceleration = self.max_rates
-        return float((speed / limits.speed).max()), float((acceleration / limits.acceleration).max())
-
-    @cached_property
-    def max_rates(self) -> tuple[Reals, Reals]:
-        """Maximum speed (n,) in rad/s and acceleration (n,) in rad/s^2 of each joint."""
-        return self.curve.max_abs(self.curve.velocity), self.curve.max_abs(self.curve.acceleration)
+        speed, acceleration = motion.max_rates
+        return float((speed / self.speed).max()), float((acceleration / self.acceleration).max())
 
 
 def joint_limits(
@@ -198,7 +150,7 @@ def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: Jo
     return t, q
 
 
-def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> Timed:
+def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> PiecewiseMotion:
     """Run along nodes from rest to rest, as fast as the limits allow, by TOPP-RA [1]_.
 
     Parameters
@@ -225,7 +177,7 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
     kept[-1] = len(s) - 1  # the end stays the end
     q, s = q[kept], s[kept]
     if len(s) == 2:
-        return within_limits(straight(q[0], q[1], limits).curve, limits, elapsed)
+        return within_limits(straight(q[0], q[1], limits), limits, elapsed)
     spline = scipy.interpolate.CubicSpline(s, q)
     cap = None if programmed is None else np.gradient(s, programmed[kept])
     constraint = toppra_library().constraint
@@ -240,7 +192,7 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
     return within_limits(polynomial_motion(run_along(s, spline, speed, t), t, SPLINE_DEGREE), limits, elapsed)
 
 
-def within_limits(curve: PiecewiseMotion, limits: JointLimits, smallest: float = 0.0) -> Timed:
+def within_limits(curve: PiecewiseMotion, limits: JointLimits, smallest: float = 0.0) -> PiecewiseMotion:
     """A motion, evenly slowed down where it exceeds a limit or is too short.
 
     Parameters
@@ -252,10 +204,9 @@ def within_limits(curve: PiecewiseMotion, limits: JointLimits, smallest: float =
     -------
     motion : the curve as it is if it keeps both, else in as little time as they allow
     """
-    motion = Timed(curve)
-    speed, acceleration = motion.ratios(limits)
-    factor = max(speed, np.sqrt(acceleration), smallest / motion.duration)
-    return motion if factor <= 1 else Timed(curve.scaled(factor))
+    speed, acceleration = limits.ratios(curve)
+    factor = max(speed, np.sqrt(acceleration), smallest / curve.duration)
+    return curve if factor <= 1 else curve.scaled(factor)
 
 
 def run_along(s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
@@ -285,7 +236,7 @@ def run_along(s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: 
     return rates
 
 
-def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
+def straight(start: Reals, end: Reals, limits: JointLimits) -> PiecewiseMotion:
     """The fastest synchronised joint move between two joint vectors, from rest to rest, in closed form.
 
     Parameters
@@ -310,10 +261,10 @@ def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
         return start + share, slope, bend
 
     breaks = law.times(np.linspace(0.0, 1.0, STRAIGHT_NODES)), law.duration * np.array([law.ramp, 1 - law.ramp])
-    return Timed(polynomial_motion(rates, np.union1d(*breaks), 2))
+    return polynomial_motion(rates, np.union1d(*breaks), 2)
 
 
-def standing(q: Reals, duration: float) -> Timed:
+def standing(q: Reals, duration: float) -> PiecewiseMotion:
     """Rest at joint angles.
 
     Parameters
@@ -326,10 +277,10 @@ def standing(q: Reals, duration: float) -> Timed:
     motion : one piece with all rates 0
     """
     still = np.zeros((1, 1, len(q)))
-    return Timed(PiecewiseMotion(np.array([0.0, duration]), q[None, None], still, still))
+    return PiecewiseMotion(np.array([0.0, duration]), q[None, None], still, still)
 
 
-def joined(parts: list[Timed]) -> Timed:
+def joined(parts: list[PiecewiseMotion]) -> PiecewiseMotion:
     """Motions one after another, each starting at rest where the one before ended at rest.
 
     Parameters
@@ -340,11 +291,11 @@ def joined(parts: list[Timed]) -> Timed:
     -------
     motion : its duration is the sum of theirs, s
     """
-    curves = [part.curve for part in parts if part.duration > 0] or [parts[-1].curve]
+    curves = [part for part in parts if part.duration > 0] or [parts[-1]]
     starts = np.concatenate([[0.0], np.cumsum([curve.duration for curve in curves])])
     times = np.concatenate([[0.0], *(curve.times[1:] + start for curve, start in zip(curves, starts))])
     series = (_stacked([getattr(curve, key) for curve in curves]) for key in ("angle", "velocity", "acceleration"))
-    return Timed(PiecewiseMotion(times, *series))
+    return PiecewiseMotion(times, *series)
 
 
 def _stacked(series: list[Reals]) -> Reals:

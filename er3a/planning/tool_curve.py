@@ -18,10 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.by_value import by_identity
-from er3a.finding import fact
-from er3a.numerics.arrays import Flags, Reals, runs
+from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.follow import WIDE_STEP, Followed, follow
-from er3a.planning.motion_faults import Interval
 from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, evaluated_between, interpolated
 from er3a.planning.profiles import times_at
@@ -72,21 +70,6 @@ def follow_as_curve(
             break
         t = np.union1d(followed.t, lost)
     return followed, curve
-
-
-def open_stretches(curve: PiecewiseMotion) -> list[Interval]:
-    """The gaps of a curve: where the closed form could not be met, or does not reach.
-
-    Parameters
-    ----------
-    curve : of n joints, with NaN rates in the gaps
-
-    Returns
-    -------
-    intervals : from start to end of each gap, s
-    """
-    times = curve.times.tolist()
-    return [Interval(times[a], times[b], fact("undecided")) for a, b in runs(np.isnan(curve.velocity[:, 0, 0]))]
 
 
 def curve_of(followed: Followed) -> tuple[PiecewiseMotion, Reals]:

@@ -33,9 +33,9 @@ from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
 from er3a.planning.motion_faults import over_limits
 from er3a.planning.piecewise import PiecewiseMotion
-from er3a.planning.profiles import FromRestToRest, Rates
+from er3a.planning.profiles import FromRestToRest
 from er3a.planning.sequences import JointSequence, joint_sequence
-from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, joined, standing
+from er3a.planning.timing import JointLimits, TimingError, fastest, joined, standing
 from er3a.robots.joint_limits import limits_exceeded
 from er3a.robots.robot import Robot
 
@@ -67,7 +67,7 @@ class WayAround:
     """
 
     corners: Reals
-    motion: Timed
+    motion: PiecewiseMotion
     along: ClearanceAlong
 
 
@@ -145,45 +145,6 @@ def _clear_at_ends(task: PlanningTask, start: Reals, end: Reals) -> float | Find
                 why=fact("pair_overlaps", pair=task.bodies.pairs[pair], depth_mm=-float(distance) * 1000),
             )
     return float(clear.min())
-
-
-@by_identity
-class PlannedMove:
-    """A planned motion as a move of the joints, as :class:`er3a.planning.moves.JointMove` is one."""
-
-    curve: PiecewiseMotion
-
-    @property
-    def duration(self) -> float:
-        """Duration, s."""
-        return self.curve.duration
-
-    def joints(self, t: Reals) -> Rates:
-        """Angles, velocities and accelerations at times.
-
-        Parameters
-        ----------
-        t : (...,), s, from 0 to ``duration``
-
-        Returns
-        -------
-        q, velocity, acceleration : (..., n), rad, rad/s and rad/s^2
-
-        Raises
-        ------
-        Er3aError
-            for times beyond start and end
-        """
-        return self.curve.rates(t)
-
-    def polynomials(self) -> PiecewiseMotion:
-        """The motion itself, piece by piece.
-
-        Returns
-        -------
-        motion : rad and s
-        """
-        return self.curve
 
 
 def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | Finding:
@@ -339,7 +300,7 @@ def _between(corners: Reals, lengths: Reals, at: float) -> Reals:
     return np.array([np.interp(at, lengths, column) for column in corners.T])
 
 
-def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | Finding]:
+def _timed(task: PlanningTask, corners: Reals) -> Iterator[PiecewiseMotion | Finding]:
     """The path with corners rounded less and less, timed under the limits."""
     sides = np.abs(np.diff(corners, axis=0)).max(axis=1)
     for share in ROUNDINGS if len(corners) > 2 else (0.0,):
@@ -354,7 +315,7 @@ def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | Finding]:
                 yield error.finding
 
 
-def _quickest(route: JointSequence, limits: JointLimits) -> Timed:
+def _quickest(route: JointSequence, limits: JointLimits) -> PiecewiseMotion:
     """As fast as speeds and accelerations allow, from halt to halt."""
     law = route.law
     assert isinstance(law, FromRestToRest)
@@ -365,27 +326,20 @@ def _quickest(route: JointSequence, limits: JointLimits) -> Timed:
     return joined(parts)
 
 
-def _with_jerk(route: JointSequence, limits: JointLimits) -> Timed:
+def _with_jerk(route: JointSequence, limits: JointLimits) -> PiecewiseMotion:
     """On quintics from halt to halt, in the time in which speeds, accelerations and jerks keep their limits."""
     curve = route.polynomials()
     assert limits.jerk is not None
-    speed, acceleration, jerk = (
-        float((curve.max_abs(series) / most).max())
-        for series, most in (
-            (curve.velocity, limits.speed),
-            (curve.acceleration, limits.acceleration),
-            (curve.jerk, limits.jerk),
-        )
-    )
-    return Timed(curve.scaled(max(speed, np.sqrt(acceleration), np.cbrt(jerk))))
+    speed, acceleration = limits.ratios(curve)
+    jerk = float((curve.max_abs(curve.jerk) / limits.jerk).max())
+    return curve.scaled(max(speed, np.sqrt(acceleration), np.cbrt(jerk)))
 
 
-def _proven(task: PlanningTask, corners: Reals, motion: Timed, depth: float) -> WayAround | None:
+def _proven(task: PlanningTask, corners: Reals, motion: PiecewiseMotion, depth: float) -> WayAround | None:
     """The motion with its clearance, if it touches nothing and keeps its limits."""
-    curve = motion.curve
-    if over_limits(task.robot, curve, task.limits.rates):
+    if over_limits(task.robot, motion, task.limits.rates):
         return None
-    grid = np.linspace(0.0, curve.duration, SHOWN)
-    along = clearance_along(task.bodies, curve.joints, curve.rate_bounds, grid, grid, depth)
+    grid = np.linspace(0.0, motion.duration, SHOWN)
+    along = clearance_along(task.bodies, motion.joints, motion.rate_bounds, grid, grid, depth)
     nearest = np.inf if along.closest < 0 else float(along.distance[along.closest])
     return WayAround(corners, motion, along) if nearest > depth else None

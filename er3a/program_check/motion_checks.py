@@ -26,9 +26,10 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Reals
-from er3a.planning import motion_faults
+from er3a.planning.motion_faults import Interval, over_limits
 from er3a.planning.piecewise import SAME_TIME, PiecewiseMotion, chebyshev_times, motion_through
 from er3a.planning.profiles import MotionLaw, law_of, trapezoid
+from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.planning.timing import SPLINE_DEGREE, JointLimits, standing
 from er3a.program_check.program_check_findings import gravity, which
 from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate
@@ -286,9 +287,9 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
     limits = rules.limits
     most = 1 if limits.acceleration_assumed else 2
     rates = limits.rates[:most] if path.ahead is None else ()  # towards the end of reach they grow without bound
-    found |= begun(motion_faults.over_limits(path.arm, curve, rates))
+    found |= begun(over_limits(path.arm, curve, rates))
     if path.of_tool and has_branches(path.arm):
-        for event in motion_faults.singular_events(path.arm, curve, rules.near):
+        for event in singular_events(path.arm, curve, rules.near):
             found[_singular(path, event)] = event.t
     return found
 
@@ -297,7 +298,7 @@ def curve_of(path: MotionPath) -> PiecewiseMotion:
     """The motion in time: cubics in the share of the way, by its law."""
     law, share = path.law, path.share
     if len(share) == 1:
-        return standing(path.q[0], 0.0).curve
+        return standing(path.q[0], 0.0)
     times = law.times(share)
     ramps = law.duration * np.array([law.ramp, 1 - law.ramp])
     times = np.union1d(times, ramps[ramps < times[-1]])
@@ -308,14 +309,14 @@ def curve_of(path: MotionPath) -> PiecewiseMotion:
     return motion_through(spline(progress), times)
 
 
-def begun(faults: Iterable[motion_faults.Interval]) -> Moments:
+def begun(faults: Iterable[Interval]) -> Moments:
     """Each fault once, from where it begins first, as it is where it is worst.
 
     Parameters
     ----------
     faults : in the order of time
     """
-    found: dict[str, motion_faults.Interval] = {}
+    found: dict[str, Interval] = {}
     for part in faults:
         first = found.setdefault(part.cause.code + which(part.cause), part)
         worst = max(first.cause, part.cause, key=gravity)
@@ -323,7 +324,7 @@ def begun(faults: Iterable[motion_faults.Interval]) -> Moments:
     return {part.cause: part.start for part in found.values()}
 
 
-def _singular(path: MotionPath, event: motion_faults.SingularEvent) -> Finding:
+def _singular(path: MotionPath, event: SingularEvent) -> Finding:
     """That a line or arc meets a singular pose, with joint speeds that stay finite, or passes one."""
     at_mm = path.along_mm(float(trapezoid(np.array(event.t), path.law.duration, path.law.ramp)[0]))
     if event.crossing:

@@ -7,6 +7,8 @@ from typing import Literal
 
 from er3a.collision.pairs import Pair
 from er3a.finding import Amount, Finding, is_one
+from er3a.planning.motion_faults import KINDS
+from er3a.planning.names import FAULTS
 from er3a.programs.instructions import Unresolved
 
 Level = Literal["pass", "note", "caution", "fail"]
@@ -55,9 +57,9 @@ def with_touches_of(found: Finding, others: Iterable[Finding]) -> Finding:
 
 FAILS = frozenset(
     (
-        *("target_out_of_reach", "way_out_of_reach", "configuration_ends", "above_limit", "below_limit"),
-        *("combination_exceeded", "too_fast", "acceleration_too_great", "load_above_payload"),
-        "program_not_understood",
+        *(code for code, kind in KINDS.items() if kind in FAULTS),
+        *("target_out_of_reach", "way_out_of_reach", "configuration_ends"),
+        *("load_above_payload", "program_not_understood"),
     )
 )
 NOTES = frozenset(("frames_from_robot_file", "meets_singularity", "clear_of_assumed", "passes_singularity"))

@@ -188,7 +188,7 @@ class Judge:
         if goal is None:
             return
         if checked.start is None:
-            limits = limit_intervals(checked.arm, standing(goal, 0.0).curve)
+            limits = limit_intervals(checked.arm, standing(goal, 0.0))
             checked.add(fact("way_not_known"), *begun(limits))
             checked.end = goal
             return

@@ -26,7 +26,7 @@ from er3a.planning.follow import follow
 from er3a.planning.motion_faults import over_limits
 from er3a.planning.moves import JointMove, line
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_curve import follow_as_curve, open_stretches
+from er3a.planning.tool_curve import follow_as_curve
 from er3a.planning.way_around import PlanningTask, WayAround, way_around
 from er3a.robots.joint_limits import limits_exceeded, within
 from er3a.robots.robot import Robot
@@ -164,7 +164,7 @@ def tool_leg(
     duration *= max(1.0, SPARE * slower)
     path = line(*ends, duration)
     followed, curve = follow_as_curve(robot, path, np.linspace(0, duration, CHECKS), waypoints[0])
-    if followed.jumps or over_limits(robot, curve, limits.rates) or open_stretches(curve):
+    if followed.jumps or over_limits(robot, curve, limits.rates):
         return None
     q_end = followed.joints(np.array([duration]))[0]
     return (GraspLeg(part, duration, followed.joints, curve.rate_bounds, q_end, ends[1]),)

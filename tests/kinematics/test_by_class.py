@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -16,7 +18,9 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.self_motions import to_rows
-from er3a.kinematics.singularity import dependent_axes, rank_losses, scaled_jacobian
+from er3a.kinematics.singularity import USUAL_NEAR, dependent_axes, scaled_jacobian
+from er3a.planning.piecewise import polynomial_motion
+from er3a.planning.singular_events import singular_events
 from er3a.robots.robot import CombinedLimit, Robot
 from testing.arms import placement
 
@@ -197,22 +201,22 @@ def test_iteration_solves_arms_of_any_kind(code, random):
 
 @pytest.mark.parametrize("code", ["three_parallel", "general_six", "six_one_prismatic"])
 def test_no_zero_of_the_determinant_is_missed(code, random):
-    robot, _ = ARMS[code]
+    (robot, _), near = ARMS[code], replace(USUAL_NEAR, smallest=1e-3)
     dense = np.linspace(0, 1, 40001)
     for _ in range(4):
         a, b = random.uniform(robot.lower, robot.upper, (2, 6))
 
-        def joints(t, a=a, b=b):
-            return a + np.asarray(t)[..., None] * (b - a)
+        def rates(t, a=a, b=b):
+            share = np.asarray(t)[..., None]
+            return a + share * (b - a), np.broadcast_to(b - a, (*np.shape(t), 6)), 0 * share * b
 
-        t = np.linspace(0, 1, 9)
-        losses = rank_losses(robot, t, joints(t), joints, 1e-3, np.abs(b - a))
-        determinant = np.linalg.det(scaled_jacobian(robot, joints(dense)))
+        events = singular_events(robot, polynomial_motion(rates, np.array([0.0, 1.0]), 1), near)
+        determinant = np.linalg.det(scaled_jacobian(robot, rates(dense)[0]))
         zeros = dense[:-1][determinant[:-1] * determinant[1:] < 0]
-        crossings = np.array([loss.at for loss in losses if loss.crossing])
-        assert all(np.abs(crossings - zero).min() < 1e-3 for zero in zeros)
-        for loss in losses:
-            assert np.linalg.svd(scaled_jacobian(robot, joints(loss.at)), compute_uv=False)[-1] < 2e-3
+        met = [(each.t - 1e-3, each.until + 1e-3) for each in events if each.crossing]
+        assert all(any(start < zero < until for start, until in met) for zero in zeros)
+        for each in (each for each in events if each.type == "dependent_axes"):
+            assert np.linalg.svd(scaled_jacobian(robot, rates(each.t)[0]), compute_uv=False)[-1] < 2e-3
 
 
 def test_axes_that_become_dependent_are_named():

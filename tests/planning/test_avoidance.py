@@ -20,9 +20,9 @@ from er3a.planning.avoidance import strategies
 from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare_strategies, deviation
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
 from er3a.planning.names import StrategyName
+from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.planning.tool_curve import curve_of
 from er3a.robots.joint_limits import within
@@ -61,22 +61,22 @@ def test_what_is_usable_ends_at_the_end_within_all_limits(results, name):
         price = result.cost
         if result.reasons:
             continue
-        np.testing.assert_allclose(forward(case.robot, price.motion.q[-1]), last, atol=2e-3)
-        assert within(case.robot, price.motion.q).all()
-        slope = np.diff(price.motion.q, axis=0) / np.diff(price.motion.t)[:, None]
+        np.testing.assert_allclose(forward(case.robot, price.motion.joints(price.motion.times)[-1]), last, atol=2e-3)
+        assert within(case.robot, price.motion.joints(price.motion.times)).all()
+        slope = np.diff(price.motion.joints(price.motion.times), axis=0) / np.diff(price.motion.times)[:, None]
         assert np.abs(slope / case.limits.speed).max() < 1.005
-        assert np.abs(price.motion.velocity[[0, -1]]).max() < 1e-9
-        assert np.abs(price.motion.acceleration / case.limits.acceleration).max() <= 1 + 1e-6
+        assert np.abs(price.motion.rates(price.motion.times)[1][[0, -1]]).max() < 1e-9
+        assert np.abs(price.motion.rates(price.motion.times)[2] / case.limits.acceleration).max() <= 1 + 1e-6
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["wrist_near", "wrist_met", "shoulder_near"])
 def test_stop_rests_on_the_path_before_the_region(results, name):
     case, price = segment_of(name), results[name]["stop"].cost
-    end = price.motion.q[-1]
+    end = price.motion.joints(price.motion.times)[-1]
     assert results[name]["stop"].reasons == (fact("path_not_finished", done=price.done),)
     assert 0.2 < price.done < 0.9
-    assert NEAR.margin(case.robot, price.motion.q).min() >= 1
+    assert NEAR.margin(case.robot, price.motion.joints(price.motion.times)).min() >= 1
     assert NEAR.margin(case.robot, end[None])[0] < 1.1
     np.testing.assert_allclose(forward(case.robot, end), case.followed.line.poses(np.array(price.done)), atol=1e-9)
     assert price.distance.max() < 1e-9
@@ -101,7 +101,7 @@ def test_slowing_down_costs_nothing_where_nothing_is_too_fast():
 def test_detour_leaves_the_path_only_between_good_poses(results, name):
     case, price = segment_of(name), results[name]["detour"].cost
     off = price.distance > 1e-7
-    at = deviation(case.followed.line, forward(case.robot, price.motion.q))[2]
+    at = deviation(case.followed.line, forward(case.robot, price.motion.joints(price.motion.times)))[2]
     (first, last) = case.regions[0]
     share = case.followed.line.progress(case.t[[first - 1, last]])[0]
     assert off.any()
@@ -115,7 +115,7 @@ def test_bent_path_keeps_its_distance_and_changes_only_what_it_may(results, name
     case, price = segment_of(name), results[name][way].cost
     assert not results[name][way].reasons
     assert price.keeps_clear
-    assert NEAR.margin(case.robot, price.motion.q).min() > 1 - 1e-6
+    assert NEAR.margin(case.robot, price.motion.joints(price.motion.times)).min() > 1 - 1e-6
     if way == "via_tilt":
         assert price.distance.max() < 1e-6
     else:
@@ -162,10 +162,10 @@ def test_another_branch_is_clear_from_the_start():
     )
     limits = joint_limits(robot, np.ones(6), 0.25)
     found = STRATEGIES["branch"](singular_segment(followed, NEAR, limits))
-    assert NEAR.margin(robot, found.motion.q).min() >= 1
+    assert NEAR.margin(robot, found.motion.joints(found.motion.times)).min() >= 1
     held = STRATEGIES["branch"](singular_segment(followed, NEAR, limits, fixed_start=True))
     assert held.motion.duration > found.motion.duration
-    np.testing.assert_allclose(held.motion.q[0], followed.q[0])
+    np.testing.assert_allclose(held.motion.joints(held.motion.times)[0], followed.q[0])
 
 
 def test_what_can_not_be_repaired_is_said_so(results):
@@ -208,7 +208,7 @@ def test_start_inside_the_region_is_left_by_a_joint_move():
     found = {
         result.name: result for result in compare_strategies(singular_segment(followed, NEAR, limits, fixed_start=True))
     }
-    np.testing.assert_allclose(found["detour"].cost.motion.q[0], q, atol=1e-9)
+    np.testing.assert_allclose(found["detour"].cost.motion.joints(found["detour"].cost.motion.times)[0], q, atol=1e-9)
     assert found["via_shift"].reasons == found["stop"].reasons == (fact("no_end", end="start", why=fact("in_region")),)
 
 

@@ -13,9 +13,10 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import TYPES, NearSingular, determinant_factors, factor_of
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import limit_intervals, rate_intervals, singular_events, unreachable
+from er3a.planning.motion_faults import limit_intervals, rate_intervals, unreachable
 from er3a.planning.moves import JointMove, line
 from er3a.planning.sequences import arc, segment_path
+from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.planning.tool_curve import curve_of
 from er3a.robots.joint_limits import nearest_equivalent, within

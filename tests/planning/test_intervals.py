@@ -14,6 +14,7 @@ from er3a.planning.follow import follow
 from er3a.planning.motion_faults import (
     RateLimit,
     limit_intervals,
+    open_stretches,
     rate_fault,
     rate_intervals,
     unreachable,
@@ -23,7 +24,7 @@ from er3a.planning.names import in_order
 from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.sequences import arc
 from er3a.planning.timing import joint_limits
-from er3a.planning.tool_curve import follow_as_curve, open_stretches
+from er3a.planning.tool_curve import follow_as_curve
 from er3a.robots.robot import CombinedLimit
 
 

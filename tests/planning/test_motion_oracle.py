@@ -10,8 +10,8 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.forward import forward
-from er3a.planning import motion_faults
-from er3a.planning.tool_curve import open_stretches
+from er3a.pipeline.stages.trajectory import judgement
+from er3a.planning.motion_faults import open_stretches
 from testing.motion_cases import (
     JOINT_KINDS,
     TOOL_KINDS,
@@ -65,7 +65,7 @@ def test_what_is_open_beside_an_event_is_undecided_where_nobody_finds_the_event(
     motion, seen = judged(robot, written, 50, limits)
     assert seen.verdict == "singular"
     assert open_stretches(motion.curve)
-    monkeypatch.setattr(motion_faults, "singular_events", lambda *_: [])
+    monkeypatch.setattr(judgement, "singular_events", lambda *_: [])
     blind = judged(robot, written, 50, limits)[1]
     assert blind.verdict != "safe"
     assert "undecided" in blind.faults

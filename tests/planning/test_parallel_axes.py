@@ -11,8 +11,8 @@ from er3a.kinematics.singularity import NearSingular, determinant_factors
 from er3a.kinematics.solutions import LABELS, branch_labels
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
+from er3a.planning.singular_events import singular_events
 from er3a.planning.tool_curve import curve_of
 from testing.arms import DEG, joints_at_random, make_arm, pose_errors
 

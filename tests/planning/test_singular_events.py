@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from er3a.kinematics.singularity import determinant_factors
-from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import JointMove
+from er3a.planning.singular_events import singular_events
 from testing.arms import OTHERS_LONG
 from testing.exact_paths import REAL, quintic_time, worst_location
 from testing.random_paths import KINDS, NEAR, Found

@@ -51,7 +51,7 @@ def test_planned_motions_touch_nothing_and_keep_their_limits(title, random):
         if is_one(way, "none_found"):
             continue
         found += 1
-        q, velocity, acceleration = way.motion.curve.rates(np.linspace(0, way.motion.duration, DENSE))
+        q, velocity, acceleration = way.motion.rates(np.linspace(0, way.motion.duration, DENSE))
         np.testing.assert_allclose(q[[0, -1]], [start, end], atol=1e-12)
         assert apart.least(q).min() > 0
         assert (q <= ROBOT.upper + 1e-9).all()
@@ -89,7 +89,7 @@ def test_equal_tasks_give_equal_bytes_whatever_was_planned_before(random):
     again = way_around(one, *first)
     assert isinstance(alone, WayAround)
     assert alone.corners.tobytes() == again.corners.tobytes()
-    assert alone.motion.curve.angle.tobytes() == again.motion.curve.angle.tobytes()
+    assert alone.motion.angle.tobytes() == again.motion.angle.tobytes()
 
 
 @pytest.mark.long
@@ -98,7 +98,7 @@ def test_jerk_is_kept_where_it_is_bounded(random):
     one = task(load_scene("data/scenes/table_and_post.yaml"), limits=joint_limits(ROBOT, np.ones(6), 0.25, jerk=jerk))
     way = way_around(one, *blocked(one.bodies, random))
     assert isinstance(way, WayAround)
-    curve = way.motion.curve
+    curve = way.motion
     assert (curve.max_abs(curve.jerk) <= jerk * (1 + 1e-9)).all()
     assert curve.steps.max() < 1e-6
 

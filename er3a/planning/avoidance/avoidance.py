@@ -14,8 +14,9 @@ from er3a.finding import Finding
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
-from er3a.planning.motion_faults import SingularEvent
-from er3a.planning.timing import JointLimits, Timed, fastest, nodes_along, straight
+from er3a.planning.piecewise import PiecewiseMotion
+from er3a.planning.singular_events import SingularEvent
+from er3a.planning.timing import JointLimits, fastest, nodes_along, straight
 from er3a.robots.robot import Robot
 
 AT_REST = 1e-6  # rad
@@ -32,7 +33,7 @@ class Avoidance:
     crosses_by_joints : whether it comes near singular sets in joint moves alone, which they do not affect
     """
 
-    motion: Timed
+    motion: PiecewiseMotion
     done: float = 1.0
     crosses_by_joints: bool = False
 
@@ -84,7 +85,7 @@ class SingularSegment:
         first: Reals = self.q[0] - self.followed.start_turn
         return first
 
-    def begin(self) -> list[Timed]:
+    def begin(self) -> list[PiecewiseMotion]:
         """The turn at rest that a singular start may ask for.
 
         Returns
@@ -95,7 +96,7 @@ class SingularSegment:
             return []
         return [straight(self.first_joints, self.q[0], self.limits)]
 
-    def along(self, first: int, last: int, programmed: bool = True) -> Timed:
+    def along(self, first: int, last: int, programmed: bool = True) -> PiecewiseMotion:
         """The path from one grid point to another, from rest to rest.
 
         Parameters

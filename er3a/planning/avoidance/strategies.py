@@ -32,8 +32,9 @@ from er3a.planning.follow import Followed, follow
 from er3a.planning.motion_faults import by_kind, over_limits
 from er3a.planning.moves import ToolPath
 from er3a.planning.names import StrategyName
+from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.profiles import quintic
-from er3a.planning.timing import JointLimits, Timed, TimingError, joined, straight
+from er3a.planning.timing import JointLimits, TimingError, joined, straight
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
@@ -192,7 +193,7 @@ def _followed(segment: avoidance.SingularSegment, path: BentPath) -> Iterator[av
         yield avoidance.singular_segment(followed, segment.near, segment.limits)
 
 
-def _carried_out(segment: avoidance.SingularSegment, other: avoidance.SingularSegment) -> Timed:
+def _carried_out(segment: avoidance.SingularSegment, other: avoidance.SingularSegment) -> PiecewiseMotion:
     leave = segment.first_joints if segment.fixed_start else other.q[0]
     turn = [straight(leave, other.q[0], segment.limits)] if np.abs(other.q[0] - leave).max() > avoidance.AT_REST else []
     return joined([*turn, other.along(0, len(other.t) - 1)])
@@ -343,7 +344,7 @@ def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | Finding:
     if not segment.regions:
         return fact("nothing_to_avoid")
     count, at = len(segment.t), 0
-    parts: list[Timed] = []
+    parts: list[PiecewiseMotion] = []
     for first, last in segment.regions:
         before, after = max(first - 1, 0), min(last, count - 1)
         if np.isnan(segment.q[before, 0]):
@@ -537,7 +538,7 @@ class StrategyCost:
         (a joint move may pass them: joint moves are unaffected by singularities)
     """
 
-    motion: Timed
+    motion: PiecewiseMotion
     done: float
     distance: Reals
     angle: Reals
@@ -605,14 +606,14 @@ def best(results: Iterable[StrategyResult], meets: bool, programmed: float = 0.0
     return min(usable)[2] if usable else None
 
 
-def beyond_limits(robot: Robot, motion: Timed, limits: JointLimits) -> list[Finding]:
+def beyond_limits(robot: Robot, motion: PiecewiseMotion, limits: JointLimits) -> list[Finding]:
     """Which limits a strategy's motion does not keep, by the judge of all motions.
 
     Returns
     -------
     causes : of each kind the first
     """
-    over = over_limits(robot, motion.curve, limits.rates, BETWEEN_POINTS)
+    over = over_limits(robot, motion, limits.rates, BETWEEN_POINTS)
     return [parts[0].cause for parts in by_kind(over).values()]
 
 
@@ -624,9 +625,10 @@ def _tried(segment: avoidance.SingularSegment, name: StrategyName) -> StrategyRe
     if not isinstance(found, avoidance.Avoidance):
         return StrategyResult(name, None, (found,))
     robot, motion, line = segment.robot, found.motion, segment.followed.line
-    T = forward(robot, motion.q)
+    q, limits = motion.joints(motion.times), segment.allowed or segment.limits
+    T = forward(robot, q)
     distance, angle, _ = deviation(line, T)
-    speed, acceleration = motion.ratios(segment.allowed or segment.limits)
+    speed, acceleration = limits.ratios(motion)
     reasons: list[Finding] = []
     last = line.poses(np.array(1.0))
     left = float(np.linalg.norm(T[-1, :3, 3] - last[:3, 3]))
@@ -635,7 +637,7 @@ def _tried(segment: avoidance.SingularSegment, name: StrategyName) -> StrategyRe
         reasons.append(fact("path_not_finished", done=found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
         reasons.append(fact("ends_off_path", distance_mm=left * 1000, angle_deg=np.degrees(twisted)))
-    reasons += beyond_limits(robot, motion, segment.allowed or segment.limits)
-    keeps = found.crosses_by_joints or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
+    reasons += beyond_limits(robot, motion, limits)
+    keeps = found.crosses_by_joints or bool(segment.near.margin(robot, q).min() > 1 - 1e-6)
     cost = StrategyCost(motion, found.done, distance, angle, speed, acceleration, keeps)
     return StrategyResult(name, cost, tuple(reasons))

@@ -276,7 +276,7 @@ def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, wrist: tuple[
     """
     entry, n = motion.entry, arm.robot.joints
     asked = set(entry.expected) <= {"safe"}
-    t = np.linspace(0.0, motion.built.duration, arm.settings.samples)
+    t = np.linspace(0.0, motion.curve.duration, arm.settings.samples)
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
         nothing = (float(t[-1]), (), (), None, None)

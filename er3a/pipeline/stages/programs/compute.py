@@ -15,7 +15,7 @@ from er3a.geometry.transforms import inverted
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
-from er3a.pipeline.scope import OF_MOTIONS, Check, Coverage, Open, coverages
+from er3a.pipeline.scope import CHECKS_OF_MOTIONS, Check, Coverage, Open, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.covered import Covered, assumed_rates, covered_collisions
 from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
@@ -110,7 +110,7 @@ def _checked(asked: Sequence[model.ProgramSummary], seen: Covered) -> tuple[Cove
     of = sum(each.motions for each in asked)
     done = max(of - sum(len(each.not_examined) for each in asked), 0)
     gaps = (*seen.gaps, *((Open("program_lines", lines),) if lines else ()))
-    checks: dict[Check, tuple[int, int]] = dict.fromkeys((*OF_MOTIONS, "limits", "singularity"), (done, done))
+    checks: dict[Check, tuple[int, int]] = dict.fromkeys(CHECKS_OF_MOTIONS, (done, done))
     return coverages({**checks, "program_lines": (done, of), **seen.asked}, gaps)
 
 

@@ -11,7 +11,7 @@ from er3a.by_value import frozen
 from er3a.finding import Finding
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Results, Summary
-from er3a.pipeline.scope import OF_MOTIONS
+from er3a.pipeline.scope import CHECKS_OF_MOTIONS
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime, LocatedFinding
 from er3a.program_check.program_check_findings import Level
@@ -100,7 +100,7 @@ class ProgramSummary:
 class ProgramsSummary(Summary):
     """Head and programs; ``scene`` is its title, None where the study names none."""
 
-    needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
+    needs = (*CHECKS_OF_MOTIONS, "self_collision", "scene_collision")
 
     scene: str | None
     programs: tuple[ProgramSummary, ...]

@@ -20,7 +20,7 @@ from er3a.kinematics.wrist_partitioned import has_branches, wrist_partition_miss
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, Status, Verdict
-from er3a.pipeline.scope import OF_MOTIONS, Check, Coverage, Open, by_reason, coverages
+from er3a.pipeline.scope import CHECKS_OF_MOTIONS, Check, Coverage, Open, by_reason, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.covered import Covered, assumed_rates, assumed_tool, covered_collisions, gaps_of_orientations
 from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
@@ -47,9 +47,11 @@ from er3a.planning.avoidance.strategies import (
     compare_strategies,
     deviation,
 )
-from er3a.planning.motion_faults import Interval, SingularEvent
+from er3a.planning.motion_faults import Interval
 from er3a.planning.names import PATH_VERDICTS, TOO_FAST, UNFOLLOWED, PathVerdict, StrategyName
-from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
+from er3a.planning.piecewise import PiecewiseMotion
+from er3a.planning.singular_events import SingularEvent
+from er3a.planning.timing import JointLimits, TimingError, fastest, nodes_along
 from er3a.planning.way_around import WayAround, way_between
 from er3a.robots.joint_limits import shown, speeds_given, within
 from er3a.robots.robot import Robot
@@ -116,7 +118,7 @@ class AvoidanceTask(MotionTask):
         met = {each: _meets(own, margin) for each, own in along.items()}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
-        chosen = best(free, meets, motion.built.duration)
+        chosen = best(free, meets, motion.curve.duration)
         tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
         return Avoided(
             tried=tried,
@@ -144,15 +146,15 @@ class AvoidanceTask(MotionTask):
 
     def _planned(self, motion: Motion) -> list[StrategyResult]:
         """The planner's motion between the ends of a path, where both can be reached."""
-        tool = motion.tool(np.array([0.0, motion.built.duration]))
+        tool = motion.tool(np.array([0.0, motion.curve.duration]))
         ends = [self._end(q, T) for q, T in zip(motion.q[[0, -1]], tool)]
         found = way_between(self, *ends)
         if not isinstance(found, WayAround):
             return [StrategyResult("planned", None, (found,))]
         timed = found.motion
         path = motion.built.tool or _ToolPath(motion)
-        distance, angle, _ = deviation(path, forward(self.robot, timed.q))
-        cost = StrategyCost(timed, 1.0, distance, angle, *timed.ratios(self.limits), keeps_clear=True)
+        distance, angle, _ = deviation(path, forward(self.robot, timed.joints(timed.times)))
+        cost = StrategyCost(timed, 1.0, distance, angle, *self.limits.ratios(timed), keeps_clear=True)
         return [StrategyResult("planned", cost)]
 
     def _end(self, q: Reals, T: Reals) -> Reals:
@@ -162,7 +164,9 @@ class AvoidanceTask(MotionTask):
         solved = inverse(self.robot, T, self_motion_rows=True)
         return solved.q[solved.within_limits]
 
-    def _joint_move(self, motion: Motion, found: judgement.Judgement) -> tuple[Timed | None, list[StrategyResult]]:
+    def _joint_move(
+        self, motion: Motion, found: judgement.Judgement
+    ) -> tuple[PiecewiseMotion | None, list[StrategyResult]]:
         """Fastest time law; slowing down is the only strategy that a joint move can need."""
         t, q = nodes_along(motion.joints, motion.t, motion.q, self.limits)
         try:
@@ -172,25 +176,24 @@ class AvoidanceTask(MotionTask):
             slower = fastest(q, self.limits, t)
         except TimingError:
             return None, []
-        speed, acceleration = slower.ratios(self.limits)
-        nothing = np.zeros(len(slower.t))
+        speed, acceleration = self.limits.ratios(slower)
+        nothing = np.zeros(len(slower.times))
         cost = StrategyCost(slower, 1.0, nothing, nothing, speed, acceleration, False)
         return quickest, [StrategyResult("slow", cost, tuple(beyond_limits(self.robot, slower, self.limits)))]
 
-    def _along(self, motion: Timed) -> ClearanceAlong:
+    def _along(self, motion: PiecewiseMotion) -> ClearanceAlong:
         """The clearance along a strategy's motion."""
-        curve = motion.curve
-        grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
-        return clearance_along(self.bodies, curve.joints, curve.rate_bounds, grid, grid, self.tolerance)
+        grid = np.linspace(0.0, motion.duration, CLEARANCE_TIMES)
+        return clearance_along(self.bodies, motion.joints, motion.rate_bounds, grid, grid, self.tolerance)
 
-    def _rows(self, path: str, strategy: str, timed: Timed, cost: StrategyCost | None) -> model.AvoidanceRows:
+    def _rows(self, path: str, strategy: str, timed: PiecewiseMotion, cost: StrategyCost | None) -> model.AvoidanceRows:
         """At most ROWS rows of a motion, and those of its maximum speed and deviation."""
-        kept = np.unique(np.linspace(0, len(timed.t) - 1, min(ROWS, len(timed.t))).round().astype(int))
+        kept = np.unique(np.linspace(0, len(timed.times) - 1, min(ROWS, len(timed.times))).round().astype(int))
         kept = kept if cost is None else np.union1d(kept, [np.argmax(cost.distance)])
-        times = np.union1d(timed.t[kept], [self._fastest_time(timed)])
-        q, velocity, acceleration = timed.curve.rates(times)
-        off = (cost.distance, cost.angle) if cost else (np.zeros(len(timed.t)),) * 2
-        distance, angle = (np.interp(times, timed.t, part) for part in off)
+        times = np.union1d(timed.times[kept], [self._fastest_time(timed)])
+        q, velocity, acceleration = timed.rates(times)
+        off = (cost.distance, cost.angle) if cost else (np.zeros(len(timed.times)),) * 2
+        distance, angle = (np.interp(times, timed.times, part) for part in off)
         measures = conditioning(self.robot, q, characteristic_length(self.robot))
         return model.AvoidanceRows.of(
             path=path,
@@ -207,11 +210,10 @@ class AvoidanceTask(MotionTask):
             smallest_singular_value=measures.smallest_singular_value,
         )
 
-    def _fastest_time(self, timed: Timed) -> float:
+    def _fastest_time(self, timed: PiecewiseMotion) -> float:
         """When a joint comes nearest to its maximum speed."""
-        curve = timed.curve
         j = int(np.argmax(timed.max_rates[0] / self.limits.speed))
-        return max(curve.of_joint(curve.velocity, j, sign).peak() for sign in (1.0, -1.0))[1]
+        return max(timed.of_joint(timed.velocity, j, sign).peak() for sign in (1.0, -1.0))[1]
 
 
 @by_identity
@@ -231,7 +233,7 @@ class _ToolPath:
         -------
         T : T_base_tool (..., 4, 4), m
         """
-        return self.motion.tool(np.asarray(progress) * self.motion.built.duration)
+        return self.motion.tool(np.asarray(progress) * self.motion.curve.duration)
 
 
 def speed_ratio(velocity: Reals, limits: JointLimits) -> Reals:
@@ -264,7 +266,7 @@ def _meets(along: ClearanceAlong, margin: float) -> tuple[Finding | None, model.
     ) if near else None, smallest
 
 
-def _quickest(segment: SingularSegment) -> Timed | None:
+def _quickest(segment: SingularSegment) -> PiecewiseMotion | None:
     if np.isnan(segment.q[:, 0]).any() or segment.followed.jumps:
         return None
     try:
@@ -291,8 +293,8 @@ def _motion(cost: StrategyCost, clearance: model.MinClearance | None) -> model.S
         max_deviation_mm=from_si("mm", cost.distance.max()),
         max_deviation_deg=from_si("deg", cost.angle.max()),
         duration=cost.motion.duration,
-        max_joint_speed=np.abs(cost.motion.velocity).max(axis=0),
-        max_joint_acceleration=np.abs(cost.motion.acceleration).max(axis=0),
+        max_joint_speed=cost.motion.max_rates[0],
+        max_joint_acceleration=cost.motion.max_rates[1],
         clearance=clearance,
     )
 
@@ -331,7 +333,7 @@ def path_summary(
         outcomes=found.outcomes,
         expect=entry.expected,
         in_joint_space=followed is None,
-        duration_s=float(motion.built.duration),
+        duration_s=float(motion.curve.duration),
         samples=entry.samples,
         length_m=float(motion.way(motion.samples[-1:])[0]),
         branches=tuple(labels[slot] for slot in slots),
@@ -517,7 +519,7 @@ def _checked(
     of = followed, followed
     gaps = (*seen.gaps, *by_reason(rest))
     gaps += (Open("not_followed", lost),) if lost else ()
-    checks: dict[Check, tuple[int, int]] = dict.fromkeys((*OF_MOTIONS, "limits", "singularity"), of)
+    checks: dict[Check, tuple[int, int]] = dict.fromkeys(CHECKS_OF_MOTIONS, of)
     return coverages({**checks, "reach": (followed, followed + len(lost)), **seen.asked}, gaps)
 
 

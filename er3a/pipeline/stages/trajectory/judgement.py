@@ -17,10 +17,10 @@ from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.motion import Motion, MotionTask
-from er3a.planning import motion_faults
+from er3a.planning.motion_faults import Interval, by_kind, joints_of, over_limits, unreachable
 from er3a.planning.names import FAULTS, NOT_TO_BE_RUN, UNFOLLOWED, PathVerdict, gravest, in_order
 from er3a.planning.piecewise import PiecewiseMotion
-from er3a.planning.tool_curve import open_stretches
+from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -50,8 +50,8 @@ class Judgement:
     verdict: PathVerdict
     of_joints: PathVerdict
     outcomes: tuple[PathVerdict, ...]
-    events: list[motion_faults.SingularEvent]
-    faults: Mapping[PathVerdict, list[motion_faults.Interval]]
+    events: list[SingularEvent]
+    faults: Mapping[PathVerdict, list[Interval]]
     along: ClearanceAlong
     max_rates: tuple[Reals, Reals] | None
     times: Reals
@@ -80,17 +80,18 @@ def judged(task: MotionTask, motion: Motion, along: ClearanceAlong | None = None
     found : gaps of the polynomials are undecided; where the path ends or is singular, they are what that leaves
     """
     curve, followed = motion.curve, motion.followed
-    events = motion_faults.singular_events(task.robot, curve, task.near)
+    events = singular_events(task.robot, curve, task.near)
     crossed, jumps = any(event.crossing for event in events), followed.jumps if followed else ()
     ends = followed is not None and (jumps or np.isnan(followed.q).any() or crossed)
     times = np.unique(np.concatenate([motion.checks, [event.t for event in events]]))
     q, velocity, acceleration = motion.rates(times)
-    beyond = motion_faults.unreachable(task.robot, followed) if followed else []
+    beyond = unreachable(task.robot, followed) if followed else []
     edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
     bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
     known = np.isfinite(curve.velocity).any()  # not where the tool reaches no point of its path
-    over = motion_faults.over_limits(task.robot, curve, task.limits.rates)
-    parts = motion_faults.by_kind([*beyond, *over, *([] if ends else open_stretches(curve))])
+    parts = by_kind([*beyond, *over_limits(task.robot, curve, task.limits.rates)])
+    if ends:  # which is why the polynomials have gaps
+        parts.pop("undecided", None)
     along = along or measured(task.bodies, task.tolerance, motion)
     spans = {kind: [(part.start, part.end) for part in own] for kind, own in parts.items() if kind in FAULTS}
     if along.contacts:
@@ -104,7 +105,7 @@ def judged(task: MotionTask, motion: Motion, along: ClearanceAlong | None = None
     verdict = gravest(there)
     if motion.not_planned:  # then the straight move is shown
         spans = {kind: own for kind, own in spans.items() if kind == "collides"}
-    firsts = in_order({verdict: [(0.0, 0.0)], **spans}, float(motion.built.duration))
+    firsts = in_order({verdict: [(0.0, 0.0)], **spans}, float(motion.curve.duration))
     return Judgement(
         verdict=verdict,
         of_joints=gravest(name for name in there if name != "collides"),
@@ -112,7 +113,7 @@ def judged(task: MotionTask, motion: Motion, along: ClearanceAlong | None = None
         events=events,
         faults=parts,
         along=along,
-        max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)) if known and bounded else None,
+        max_rates=curve.max_rates if known and bounded else None,
         times=times,
         q=q,
         velocity=velocity,
@@ -135,7 +136,7 @@ def measured(bodies: Bodies, tolerance: float, motion: Motion) -> ClearanceAlong
     return clearance_along(bodies, motion.joints, motion.rate_bounds, motion.t, motion.samples, tolerance)
 
 
-def collisions(robot: Robot, along: ClearanceAlong, margin: float) -> list[motion_faults.Interval]:
+def collisions(robot: Robot, along: ClearanceAlong, margin: float) -> list[Interval]:
     """Stretches of a motion on which bodies overlap.
 
     Parameters
@@ -148,7 +149,7 @@ def collisions(robot: Robot, along: ClearanceAlong, margin: float) -> list[motio
     stretches : in s, each with its pairs of bodies, and their depths in mm
     """
     return [
-        motion_faults.Interval(
+        Interval(
             contact.start,
             contact.end,
             fact(
@@ -328,7 +329,7 @@ def advised_end(path: model.PathSummary, rows: model.PathChecks, limits: model.L
     until = path.clear_until
     if path.not_planned or (path.of("collides") and until is None):
         return None
-    found = motion_faults.by_kind(path.faults)
+    found = by_kind(path.faults)
     starts = [part.t0_s for kind, own in found.items() if kind != "collides" for part in own]
     starts += [event.t_s for event in path.singular]
     starts += [] if path.in_joint_space else rows.t_s[rows.near_singular][:1].tolist()
@@ -336,7 +337,7 @@ def advised_end(path: model.PathSummary, rows: model.PathChecks, limits: model.L
     stop = (np.abs(rows.q_deg_s) / limits.acceleration_deg_s2).max(axis=1)
     kept = rows.reachable & (rows.t_s + STOPS * stop <= first) & (np.nan_to_num(rows.speed_ratio) <= SPEED_MARGIN)
     for part in found.get("leaves limits", ()):
-        joints, at = [j - 1 for j in motion_faults.joints_of(part.cause)], int(np.argmin(np.abs(rows.t_s - part.t0_s)))
+        joints, at = [j - 1 for j in joints_of(part.cause)], int(np.argmin(np.abs(rows.t_s - part.t0_s)))
         if joints:
             kept &= np.abs(rows.q_deg[:, joints] - rows.q_deg[at, joints]).max(axis=1) >= LIMIT_MARGIN
     for lost in found.get("unreachable", ()):

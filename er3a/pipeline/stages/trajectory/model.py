@@ -16,7 +16,7 @@ from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary
-from er3a.pipeline.scope import OF_MOTIONS
+from er3a.pipeline.scope import CHECKS_OF_MOTIONS
 from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.motion_faults import by_kind
@@ -344,7 +344,7 @@ class TrajectorySummary(Summary):
     penetration_tolerance_mm : no overlap deeper than this goes unnoticed between points
     """
 
-    needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
+    needs = (*CHECKS_OF_MOTIONS, "self_collision", "scene_collision")
 
     characteristic_length_m: float
     near: NearThresholds

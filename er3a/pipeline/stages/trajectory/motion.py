@@ -30,14 +30,13 @@ from er3a.pipeline.study import Study
 from er3a.planning.class_follow import PathEndsError, follow_by_class
 from er3a.planning.commands import Built, Command, CommandSource, PlanCommand, build
 from er3a.planning.follow import Followed
-from er3a.planning.moves import JointMove
 from er3a.planning.names import PathVerdict
 from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.sequences import TURN_LENGTH, JointSequence, SegmentPath
 from er3a.planning.stated_rates import StatedMotion
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
 from er3a.planning.tool_curve import follow_as_curve
-from er3a.planning.way_around import PlannedMove, PlanningTask, WayAround, way_between
+from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramPart, check_program, parts_of
 from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import meant, shown
@@ -247,13 +246,12 @@ def motion_of(
     built = build(robot, command, ends)
     samples, checks = _times(entry, built.duration, checks_per_sample)
     if built.joints is not None:
-        return _joint_motion(robot, entry, built, built.joints, samples, checks)
+        return _joint_motion(robot, entry, built, built.joints.polynomials(), samples, checks)
     path = built.tool
     if path is None:
         raise ValueError(f"{entry.name}: neither a move of the joints nor a path of the tool")
     if not has_branches(robot):
-        move = PlannedMove(follow_by_class(robot, path, built.q_start))
-        return _joint_motion(robot, entry, replace(built, joints=move), move, samples, checks)
+        return _joint_motion(robot, entry, built, follow_by_class(robot, path, built.q_start), samples, checks)
     try:
         even = np.linspace(0.0, built.duration, FOLLOWED_AT)
         followed, curve = follow_as_curve(robot, path, even, built.q_start, built.start_slot)
@@ -294,13 +292,12 @@ def _planned(task: PlanningTask, entry: PlannedEntry, command: PlanCommand, chec
     starts, ends = (joints_at(robot, end) for end in (command.start, command.end))
     found = way_between(task, starts, ends)
     if isinstance(found, WayAround):
-        curve, reason = found.motion.curve, None
+        curve, reason = found.motion, None
     elif len(starts) and len(ends):
-        curve, reason = straight(starts[0], ends[0], task.limits).curve, found
+        curve, reason = straight(starts[0], ends[0], task.limits), found
     else:
-        curve, reason = standing(np.clip(np.zeros(len(robot.lower)), robot.lower, robot.upper), 1.0).curve, found
-    built = Built(joints=PlannedMove(curve))
-    motion = _joint_motion(robot, entry, built, PlannedMove(curve), *_times(entry, built.duration, checks_per_sample))
+        curve, reason = standing(np.clip(np.zeros(len(robot.lower)), robot.lower, robot.upper), 1.0), found
+    motion = _joint_motion(robot, entry, Built(), curve, *_times(entry, curve.duration, checks_per_sample))
     return replace(motion, not_planned=reason)
 
 
@@ -330,14 +327,9 @@ def _times(entry: PlannedEntry, duration: float, checks_per_sample: int) -> tupl
 
 
 def _joint_motion(
-    robot: Robot,
-    entry: PlannedEntry,
-    built: Built,
-    move: JointMove | JointSequence | StatedMotion | PlannedMove,
-    samples: Reals,
-    checks: Reals,
+    robot: Robot, entry: PlannedEntry, built: Built, curve: PiecewiseMotion, samples: Reals, checks: Reals
 ) -> Motion:
-    q, velocity, _ = move.joints(checks)
+    q, velocity, _ = curve.rates(checks)
     speed = np.linalg.norm(np.einsum("nij,nj->ni", jacobian(robot, q)[:, :3], velocity), axis=1)
     way = scipy.interpolate.CubicHermiteSpline(
         checks, scipy.integrate.cumulative_simpson(speed, x=checks, initial=0.0), speed
@@ -349,12 +341,12 @@ def _joint_motion(
         checks=checks,
         t=checks,
         q=q,
-        joints=lambda t: move.joints(t)[0],
-        rates=move.joints,
-        tool=lambda t: forward(robot, move.joints(t)[0]),
+        joints=curve.joints,
+        rates=curve.rates,
+        tool=lambda t: forward(robot, curve.joints(t)),
         way=way,
         followed=None,
-        curve=move.polynomials(),
+        curve=curve,
     )
 
 
