@@ -619,11 +619,12 @@ def _error_left_out(observations: PointObservations, found: Fit) -> float:
 
 
 def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> Calibration:
-    used = _without_outliers(robot, every)
+    used = rough_places(robot, every)[1]
+    used |= (~used).mean() > MAX_OUTLIER_SHARE
     model = _model(robot, every.take(used).merged(), free_ratios)
-    for _ in range(OUTLIER_ROUNDS):
-        off = _off_mm(robot, every, model, used)
-        again = _out_of(every, off, used[every.pose_of]) <= 1.0
+    for _ in range(2 * OUTLIER_ROUNDS):
+        out = _out_of(every, _off_mm(robot, every, model, used), used[every.pose_of])
+        again = out <= max(1.0, TOGETHER * out[used].max())
         if (again == used).all() or (~again).mean() > MAX_OUTLIER_SHARE:
             break
         used, model = again, _model(robot, every.take(again).merged(), free_ratios)
@@ -655,35 +656,6 @@ def _wrong(robot: Robot, observations: PointObservations, found: Calibration) ->
     )
     too_much = not observations.deviation_known and found.rms_after_mm > FAR_REST * whole_length_mm(robot)
     return fact("far_from_table", entries=far, rest_mm=found.rms_after_mm) if far or too_much else None
-
-
-def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
-    """Points (P,) that are used for a first model: those far out are set aside, the farthest first, because they bend
-    the table; all are used if they are many."""
-    all_used = np.ones(len(every.row_values), dtype=bool)
-    used, observations = all_used.copy(), every
-    while True:
-        try:
-            found = _fitted(robot, choose_level(robot, observations.merged()), observations)
-        except CalibrationError:
-            if observations is not every:
-                return all_used
-            used = rough_places(robot, every)[1]
-            if used.all() or (~used).mean() > MAX_OUTLIER_SHARE:
-                raise
-            observations = every.take(used)
-            continue
-        if len(found.after) <= 2 * len(found.kept):
-            return all_used
-        off = found.after * observations.deviation_mm
-        out = _out_of(observations, off, np.ones(len(off), dtype=bool))
-        far = out > max(1.0, TOGETHER * out.max())
-        if not far.any():
-            return used
-        used[np.flatnonzero(used)[far]] = False
-        if (~used).mean() > MAX_OUTLIER_SHARE:
-            return all_used
-        observations = observations.take(~far)
 
 
 def _out_of(observations: PointObservations, off_mm: Reals, usual: Flags) -> Reals:

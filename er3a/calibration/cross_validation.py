@@ -115,9 +115,7 @@ class _Linear:
         -------
         errors : (n,) for each way of leaving out, in standard deviations of a coordinate
         """
-        J, square = np.ascontiguousarray(self.J[:, columns]), np.ix_(np.array(columns), np.array(columns))
-        whole, right = self.whole[0][square] + np.diag(self._prior[columns]), self.whole[1][columns]
-        found = []
+        J, (whole, right), found = np.ascontiguousarray(self.J[:, columns]), self._normal(columns), []
         for parts in self._parts:
             errors = np.empty_like(self.rest)
             for out in parts:
@@ -150,10 +148,13 @@ class _Linear:
         -------
         amounts, squares : (c,), and the sum of squares that they leave
         """
-        information = self.whole[0][np.ix_(np.array(columns), np.array(columns))] + np.diag(self._prior[columns])
-        amounts = np.linalg.solve(information, self.whole[1][columns])
+        amounts = np.linalg.solve(*self._normal(columns))
         rest = self.rest - self.J[:, columns] @ amounts
         return amounts / self.scale[columns], float(rest @ rest)
+
+    def _normal(self, columns: list[int]) -> tuple[Reals, Reals]:
+        """The normal equations of a fit to all coordinates."""
+        return self.whole[0][np.ix_(columns, columns)] + np.diag(self._prior[columns]), self.whole[1][columns]
 
 
 def parts_of(observations: PointObservations, seed: int) -> tuple[Integers, Integers]:

@@ -15,6 +15,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from er3a.by_value import by_identity
 from er3a.calibration.observations import PointObservations
@@ -31,7 +32,7 @@ from er3a.calibration.parameters import (
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
 from er3a.comparison.entries import BASE_COLUMNS, Entry, entry_twists
 from er3a.finding import Finding, fact
-from er3a.geometry.transforms import nearest_rotations, posed, rpy_of, skew, transposed
+from er3a.geometry.transforms import exp_rotation, nearest_rotations, posed, rpy_of, skew, transposed
 from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
@@ -49,7 +50,7 @@ ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
 CLEAR = 10.0
 """Times what the table leaves of touched points that the ways of joints that slide have to be to set a length, root
 mean square. Taken for part of it, what is left errs by the square, 1 %."""
-MIN_ALIGNED, TURNS = 3, 5
+MIN_ALIGNED = 3
 FAR = 2.0  # times as near, where base and tool start elsewhere than in the robot's file
 OUTLIER_ROUNDS = 3
 FAR_OUT = 6.0
@@ -316,9 +317,8 @@ def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, 
     """Rough places of base and tool, by the table as it is and points that were measured whole.
 
     The tracker's frame may be anywhere, and the tool's place a guess. Let the table put points at x, and turn flanges
-    by R. A base S and a tool moved by t then put the measured points at ``m = S (x + R t)``. So
-    ``inv(S) m - R t = x``: linear in the 12 numbers of inv(S) and in t, if its rotation may be any matrix. From the
-    rotation nearest to that, t for a base and the base for a t are found by turns.
+    by R. A base S and a tool moved by t then put the measured points at ``m = S (x + R t)``, which is solved by least
+    squares, from where the base alone would be.
 
     Parameters
     ----------
@@ -332,12 +332,11 @@ def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, 
     whole = np.flatnonzero(observations.seen[:, :3].all(axis=1) & (observations.touched < 0))
     used, own = np.ones(len(observations.seen), dtype=bool), np.ones(len(whole), dtype=bool)
     S, t, inverse = np.eye(4), np.zeros(3), np.linalg.inv(robot.base)
-    x, R = observations.positions(robot)[whole], observations.turns(robot)
-    R, turned = np.where(observations.on_tool[:, None, None], R, 0.0)[whole], robot.base[:3, :3].T @ R  # of flange: 0
+    turned = inverse[:3, :3] @ observations.turns(robot)
     values = np.zeros(observations.seen.shape)
     values[observations.seen] = observations.values_mm / MM
-    x, m = (xyz @ inverse[:3, :3].T + inverse[:3, 3] for xyz in (x, values[whole, :3]))
-    R = inverse[:3, :3] @ R
+    x, m = (xyz @ inverse[:3, :3].T + inverse[:3, 3] for xyz in (observations.positions(robot), values[:, :3]))
+    x, m, R = x[whole], m[whole], np.where(observations.on_tool[:, None, None], turned, 0.0)[whole]  # of flange: 0
     for _ in range(OUTLIER_ROUNDS):
         if own.sum() < MIN_ALIGNED:
             break
@@ -354,26 +353,19 @@ def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, 
 
 def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) -> tuple[Reals, Reals]:
     """S (4, 4) and t (3,) of :func:`rough_places`, each left where it is if it is not free."""
-    eye = np.broadcast_to(np.eye(3), R.shape)
-    starts, columns = [np.eye(3)], R
-    if "base" in free:
-        starts, columns = [aligned(x, m)[0][:3, :3]], np.concatenate([R, eye], axis=2)
-        if "tool" in free:
-            by_place = np.einsum("pij,pk->pijk", eye, m).reshape(-1, 3, 9)
-            rows = np.concatenate([by_place, -eye, -R], axis=2).reshape(-1, 15)
-            inverse = np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3)
-            starts.append(nearest_rotations(inverse.T))
-    found = []
-    for turn in starts:
-        S, t = posed(turn, np.zeros(3)), np.zeros(3)
-        for _ in range(TURNS):
-            if "tool" in free:
-                back = (m @ S[:3, :3] - x).ravel()
-                t = np.linalg.lstsq(columns.reshape(len(back), -1), back, rcond=None)[0][:3].astype(float)
-            if "base" in free:
-                S = aligned(x + R @ t, m)[0]
-        found.append((float(np.linalg.norm((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m)), S, t))
-    return min(found, key=lambda each: each[0])[1:]
+    start = aligned(x, m)[0] if "base" in free else np.eye(4)
+    moving = np.repeat(["base" in free, "tool" in free], (6, 3))
+
+    def at(v: Reals) -> tuple[Reals, Reals]:
+        """Base shifted and turned from the start, and the tool's shift."""
+        v = moving * v
+        return start @ posed(exp_rotation(v[3:6]), v[:3]), v[6:]
+
+    def off(v: Reals) -> Reals:
+        S, t = at(v)
+        return ((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m).ravel()
+
+    return at(scipy.optimize.least_squares(off, np.zeros(len(moving)), method="lm").x)
 
 
 def places_at(robot: Robot, kept: Sequence[Entry], observations: PointObservations) -> Reals:

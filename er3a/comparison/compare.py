@@ -679,8 +679,7 @@ def _unit_slips(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances
 
     fits = [slips for slips in sets if same(slips)] if len(sets) * len(offsets) > 1 else [()]
     if not fits and explain and len(sets) > 1:
-        likely = _length_slips(robot_a, robot_b, only_nearest=True)
-        nearest = min(((*lengths, *angles) for lengths, angles in itertools.product(likely, twists)), key=rank)
+        nearest = min(sets, key=rank)
         fits = [nearest] if 2 * rank(nearest)[0] < rank(())[0] else []
     every = [(*slips, *more) for slips in fits for more in offsets]
     return _merged(min(every, key=rank) if len(every) > 1 else every[0] if every else ())
@@ -695,16 +694,15 @@ def _merged(slips: tuple[Cause, ...]) -> tuple[Cause, ...]:
     return tuple(found.values())
 
 
-def _length_slips(robot_a: Robot, robot_b: Robot, only_nearest: bool = False) -> list[tuple[Cause, ...]]:
-    """Ways in which a and d of two tables can be in different units: none, both, or one of them; of about equally near
-    factors all, or the nearest alone."""
+def _length_slips(robot_a: Robot, robot_b: Robot) -> list[tuple[Cause, ...]]:
+    """Ways in which a and d of two tables can be in different units: none, both, or one of them."""
     pair = [mechanism.mechanism_of(each, ends=False) for each in (robot_a, robot_b)]
     factors: set[float] = set()
     used = [column for column in ("a", "d") if getattr(robot_a, column).any() and getattr(robot_b, column).any()]
     for column, (one, other) in itertools.product(used, (pair, (robot_a, robot_b))):
         sums = [float(np.abs(getattr(each, column)).sum()) for each in (one, other)]
         if min(sums) > 0:
-            factors |= _likely_factor(sums[1] / sums[0], only_nearest)
+            factors |= _likely_factor(sums[1] / sums[0])
     alone = [
         _length_cause(robot_a, robot_b, (column,), factor)
         for column, factor in itertools.product(used, sorted(factors))
@@ -721,13 +719,13 @@ def _bears_out(one: Reals, other: Reals, factor: float) -> bool:
     return bool(after > max(before, 1))
 
 
-def _likely_factor(ratio: float, only_nearest: bool = False) -> set[float]:
+def _likely_factor(ratio: float) -> set[float]:
     """The factor between two units that is nearest a ratio, within 2, if 1 is not nearer; and those about as near."""
     off = {factor: abs(math.log(ratio / factor)) for factor in (1.0, *LENGTH_FACTORS)}
     near = min(off, key=off.__getitem__)
     if near == 1.0 or off[near] > math.log(2):
         return set()
-    return {near, *(factor for factor in LENGTH_FACTORS if off[factor] < NEAR_FACTOR and not only_nearest)}
+    return {near, *(factor for factor in LENGTH_FACTORS if off[factor] < NEAR_FACTOR)}
 
 
 def _length_cause(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...], factor: float) -> Cause:

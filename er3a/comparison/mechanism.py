@@ -36,7 +36,7 @@ from functools import cached_property
 import numpy as np
 
 from er3a.by_value import by_identity, frozen
-from er3a.geometry.transforms import rot_x, rot_y, rot_z, rotation_angle, translation
+from er3a.geometry.transforms import exp_rotation, rot_x, rot_y, rot_z, rotation_angle, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
@@ -171,11 +171,7 @@ def _measured_at(mechanism: Mechanism, k: int, height: float | None) -> Mechanis
     along = -(a * w[0]) / lean**2 if height is None else (height - d) / w[2]
     crossing = point + along * w
     radius = math.hypot(crossing[0], crossing[1])
-    if height is None:
-        turned = math.atan2(w[0], -w[1])
-        if crossing[0] * math.cos(turned) + crossing[1] * math.sin(turned) < 0:
-            turned += math.pi
-    elif radius > ON_AXIS:
+    if radius > ON_AXIS:
         turned = math.atan2(crossing[1], crossing[0])
     else:
         turned = math.atan2(w[0], -w[1]) if lean > ON_AXIS else 0.0
@@ -282,10 +278,9 @@ class _Scores:
     entries: Reals
     layers: Reals
     either: Flags
-    inexact: bool
 
 
-def _scores(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, with_ends: bool) -> _Scores:
+def _scores(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> _Scores:
     """All senses of the other arm's axes, each with the normals by which the fewest entries differ."""
     m, links = len(one.d), len(one.a)
     senses = 1.0 - 2.0 * np.array(list(itertools.product((0, 1), repeat=m)))
@@ -322,9 +317,8 @@ def _scores(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, with_en
     total += (moved & fixed).sum(axis=1)
     moved &= ~one.sliding
     layers = (senses * other.direction * one.direction < 0).sum(axis=1) + moved.sum(axis=1)
-    if with_ends:
-        layers = layers + _ends_turned(one, other, senses, turned, tolerances)
-    return _Scores(senses, normals, folds, total, layers, either, bool(inexact.any()))
+    layers = layers + _ends_turned(one, other, senses, turned, tolerances)
+    return _Scores(senses, normals, folds, total, layers, either)
 
 
 def least_cost(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> float:
@@ -339,20 +333,17 @@ def least_cost(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> floa
     -------
     cost : shifts of base and flange are not in it
     """
-    scores = _scores(one, other, tolerances, with_ends=True)
+    scores = _scores(one, other, tolerances)
     return float((ENTRY * np.floor(scores.entries) + scores.layers).min())
 
 
-def _likely_senses(
-    one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True
-) -> list[tuple[Reals, Reals]]:
+def _likely_senses(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> list[tuple[Reals, Reals]]:
     """Senses (m,) and normals (m - 1,) of the other arm, those first by which the fewest entries differ, then those
-    that turn the fewest bases, flanges, joints and zeros; only those by which none has to if they may not."""
-    scores, by_link = _scores(one, other, tolerances, with_ends=may_differ), np.arange(len(one.a))
+    that turn the fewest bases, flanges, joints and zeros."""
+    scores, by_link = _scores(one, other, tolerances), np.arange(len(one.a))
     total = scores.entries
     order = np.argsort(np.floor(total) + 0.01 * scores.layers + 1e-3 * (total % 1), kind="stable")
-    most = np.floor(total).min() + 1 if may_differ or scores.inexact else 0
-    best = order[np.floor(total[order]) <= most][: MAX_SENSES * (4 if one.sliding.any() else 1)]
+    best = order[np.floor(total[order]) <= np.floor(total).min() + 1][: MAX_SENSES * (4 if one.sliding.any() else 1)]
     found = []
     for k in best:
         senses, normals = scores.senses[k], scores.normals[k]
@@ -366,12 +357,12 @@ def _ends_turned(one: Mechanism, other: Mechanism, senses: Reals, turned: Reals,
     """What base and flange that turn count for, (S,), by senses (S, m) and turns (S, m) of zeros."""
     total = np.zeros(len(senses))
     for k, own, theirs in ((0, one.base, other.base), (-1, one.flange, other.flange)):
-        over, c, s = senses[:, k], np.cos(turned[:, k]), np.sin(turned[:, k])
-        turn = np.zeros((len(senses), 3, 3))  # Rx(0 or pi) Rz of the base, Rz Rx of the flange
-        turn[:, 0, 0], turn[:, 1, 1], turn[:, 2, 2] = c, over * c, over
-        turn[:, 0, 1], turn[:, 1, 0] = (-s, over * s) if k == 0 else (-over * s, s)
-        R = theirs[:3, :3] @ turn @ own[:3, :3].T if k == 0 else own[:3, :3].T @ turn @ theirs[:3, :3]
-        axis = own[:3, :3].T[:, 2] if k else own[:3, 2]
+        spun = exp_rotation(turned[:, [k]] * np.eye(3)[2])
+        over = np.where(np.arange(3), senses[:, [k]], 1.0)[:, None]  # half a turn about x, or none
+        if k == 0:
+            R, axis = (theirs[:3, :3] * over) @ spun @ own[:3, :3].T, own[:3, 2]
+        else:
+            R, axis = own[:3, :3].T @ (spun * over) @ theirs[:3, :3], own[2, :3]
         about_axis = R @ axis @ axis > math.cos(tolerances.angle)
         total += np.where(about_axis, 1, TURNED_END) * (
             np.trace(R, axis1=1, axis2=2) < 1 + 2 * math.cos(tolerances.angle)
@@ -478,9 +469,29 @@ def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
     -------
     match : of ``other`` brought onto ``one``
     """
-    found = _best_match(one, other, tolerances)
-    assert found is not None
-    return found
+    most = np.maximum(one.between, other.between)
+    near = (most > EXACTLY_PARALLEL) & (most < NEARLY_PARALLEL)
+    lone = near & (np.minimum(one.between, other.between) < EXACTLY_PARALLEL)
+    exact = by_normals(one), by_normals(other)
+    local = without_far_normals(one), without_far_normals(other)
+    best: Match | None = None
+    best_rank: tuple[float, ...] = ()
+    for senses, normals in _likely_senses(*exact, tolerances):
+        pairs = [] if lone.any() else [(exact[0], with_senses(exact[1], senses, normals))]
+        if near.any():
+            turned = with_senses(local[1], senses, _normals_of_near(local, near, normals))
+            pairs.append(_measured_alike(local[0], turned))
+            pairs.append((one, with_senses(other, senses, _normals_of_near((one, other), near, normals))))
+        for first, second in pairs:
+            for found in _settled(first, second, tolerances):
+                entries, layers, *sizes = found.rank
+                rank = entries, layers, float(first is not one), *sizes  # of equals in the entries that are printed
+                if best is None or rank < best_rank:
+                    best, best_rank = found, rank
+        if best is not None and best.rank[0] == best.layers == 0:
+            break
+    assert best is not None
+    return best
 
 
 def is_same_mechanism(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
@@ -495,9 +506,7 @@ def is_same_mechanism(one: Mechanism, other: Mechanism, tolerances: Tolerances) 
     -------
     same : zeros, directions, base and flange may differ
     """
-    if _links_differ(one, other, tolerances):
-        return False
-    return _best_match(one, other, tolerances, may_differ=False) is not None
+    return not _links_differ(one, other, tolerances) and match(one, other, tolerances).rank[0] == 0
 
 
 def _links_differ(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
@@ -509,31 +518,6 @@ def _links_differ(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> b
     placed = ~_beside_a_slide(one.sliding) & ((least > NEARLY_PARALLEL) | (most < EXACTLY_PARALLEL))
     apart = placed & (np.abs(np.abs(one.a) - np.abs(other.a)) > tolerances.length)
     return bool((apart | (most - least > np.where(least > NEARLY_PARALLEL, tolerances.angle, NEARLY_PARALLEL))).any())
-
-
-def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True) -> Match | None:
-    most = np.maximum(one.between, other.between)
-    near = (most > EXACTLY_PARALLEL) & (most < NEARLY_PARALLEL)
-    lone = near & (np.minimum(one.between, other.between) < EXACTLY_PARALLEL)
-    exact = by_normals(one), by_normals(other)
-    local = without_far_normals(one), without_far_normals(other)
-    best: Match | None = None
-    best_rank: tuple[float, ...] = ()
-    for senses, normals in _likely_senses(*exact, tolerances, may_differ=may_differ):
-        pairs = [] if lone.any() else [(exact[0], with_senses(exact[1], senses, normals))]
-        if near.any():
-            turned = with_senses(local[1], senses, _normals_of_near(local, near, normals))
-            pairs.append(_measured_alike(local[0], turned))
-            pairs.append((one, with_senses(other, senses, _normals_of_near((one, other), near, normals))))
-        for first, second in pairs:
-            for found in _settled(first, second, tolerances, may_differ=may_differ):
-                entries, layers, *sizes = found.rank
-                rank = entries, layers, float(first is not one), *sizes  # of equals in the entries that are printed
-                if best is None or rank < best_rank:
-                    best, best_rank = found, rank
-        if best is not None and (not may_differ or best.rank[0] == best.layers == 0):
-            break
-    return best
 
 
 def _normals_of_near(arms: tuple[Mechanism, Mechanism], near: Flags, normals: Reals) -> Reals:
@@ -552,9 +536,8 @@ def _measured_alike(one: Mechanism, other: Mechanism) -> tuple[Mechanism, Mechan
     return one, other
 
 
-def _settled(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True) -> Iterator[Match]:
-    """The match for chosen senses; where axes beside a slide are parallel to it, also the one with its own theta; those
-    alone in which geometry agrees if it may not differ."""
+def _settled(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Iterator[Match]:
+    """The match for chosen senses; where axes beside a slide are parallel to it, also the one with its own theta."""
     least = NEARLY_PARALLEL if one.beta.any() or other.beta.any() else EXACTLY_PARALLEL
     parallel = other.between < np.where(one.between < NEARLY_PARALLEL, least, EXACTLY_PARALLEL)
     ways = [_with_free_turns(one, other, parallel, tolerances)]
@@ -562,9 +545,7 @@ def _settled(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_di
     if (np.abs(wrap_to_pi(other.offset - one.offset))[1:-1][beside[1:-1]] > tolerances.angle).any():
         ways.append(_with_free_turns(one, other, parallel, tolerances, of_slides=False))
     for placed in ways:
-        found = _settled_at(one, other, parallel, placed, tolerances, may_differ=may_differ)
-        if found is not None:
-            yield found
+        yield _settled_at(one, other, parallel, placed, tolerances)
 
 
 def _settled_at(
@@ -573,36 +554,30 @@ def _settled_at(
     parallel: Flags,
     placed: tuple[Reals, Reals],
     tolerances: Tolerances,
-    *,
-    may_differ: bool,
-) -> Match | None:
-    """The match for chosen senses, and offsets and translations of the other's links; None where geometry differs and
-    may not."""
+) -> Match:
+    """The match for chosen senses, and offsets and translations of the other's links."""
     m, links = len(one.d), len(one.a)
     offset, steps = placed
     turned = wrap_to_pi(offset - one.offset)
     slides = [k for k in range(1, m - 1) if one.sliding[k]]
     differences, worst_angle = _angles_differ(one, other, turned, slides, tolerances)
-    if differences and not may_differ:
-        return None
     gaps = steps - np.stack([one.a, np.zeros(links), one.d[:links]], axis=1)
-    shifts, places = _free_shifts(one, other, parallel, offset)
+    shifts, near, far = _free_shifts(one, other, parallel, offset)
     parts = np.linalg.svd(shifts) if links else (np.eye(0), np.empty(0), np.eye(shifts.shape[1]))
     entries, counted, left = _entries(one, gaps.ravel(), parts, tolerances)
     differences += entries
-    if not may_differ and (differences or left > tolerances.length):
-        return None
     explained = np.zeros((links, 3))
     for each in entries:
         explained[each.link, 0 if each.column == "a" else 2] += each.other - each.one
-    shift = _shifts_chosen(one, other, (gaps - explained).ravel(), parts, places, turned=turned, tolerances=tolerances)
+    left_over = (gaps - explained).ravel()
+    near, far = _shifts_chosen(one, other, left_over, parts, (near, far), turned=turned, tolerances=tolerances)
 
     for k in np.flatnonzero(parallel & (other.between > tolerances.angle)).tolist():  # what moving along one leaves
         off_axis = math.sin(other.between[k]) - tolerances.angle
-        left = max(left, abs(float(shift[k + 1][0][2])) * off_axis)
-    zeros = np.where(one.sliding, [shift[k][1][2] - shift[k][0][2] for k in range(m)], turned)
+        left = max(left, abs(float(near[k + 1, 2])) * off_axis)
+    zeros = np.where(one.sliding, (far - near)[:, 2], turned)
     zeros[np.array([k in (0, m - 1) and not one.sliding[k] for k in range(m)])] = 0.0
-    placed = _ends_placed(one, other, turned, (shift[0][0], shift[m - 1][1]))
+    placed = _ends_placed(one, other, turned, (near[0], far[-1]))
     reverses = one.direction * other.direction < 0
     moved = tolerances.exceeded(zeros, one.sliding)
     at_axes = np.linalg.inv(one.base) @ placed[0] @ one.base, one.flange @ placed[1] @ np.linalg.inv(one.flange)
@@ -719,33 +694,25 @@ def _with_free_turns(
     return offset, steps
 
 
-def _free_shifts(one: Mechanism, other: Mechanism, parallel: Flags, offset: Reals) -> tuple[Reals, list[list[int]]]:
-    """What the translations of links (3 (m - 1),) change by shifts that are free at the joints, and their columns.
+def _free_shifts(one: Mechanism, other: Mechanism, parallel: Flags, offset: Reals) -> tuple[Reals, Reals, Reals]:
+    """What the translations of links (3 (m - 1), s) change by s shifts that are free at the joints, and where these
+    (m, 3, s) move a joint's near and far side, in its own frame.
 
     Of joint k: one along its axis if it turns; if it slides two across it, and one along it on either side.
     """
-    m, links = len(one.d), len(one.a)
-    places, count = [], 0
-    for k in range(m):
-        size = 4 if one.sliding[k] else 1
-        places.append(list(range(count, count + size)))
-        count += size
-    matrix, turns = np.zeros((links, 3, count)), _turns_across(other)
-    for k in range(links):
-        R = turns[k]
-        if parallel[k]:
-            R = np.diag([1.0, 0.0, 0.0]) + np.sign(np.cos(other.alpha[k])) * np.diag([0.0, 1.0, 1.0])
-        start, end = places[k], places[k + 1]
-        if one.sliding[k]:
-            matrix[k][:, start[0]], matrix[k][:, start[1]], matrix[k][:, start[3]] = np.eye(3)
+    places = np.cumsum([0, *np.where(one.sliding, 4, 1)])
+    near, far = np.zeros((2, len(one.d), 3, places[-1]))
+    for k, slides in enumerate(one.sliding):
+        if slides:
+            near[k][:, places[k] + np.array([0, 1, 2])] = far[k][:, places[k] + np.array([0, 1, 3])] = np.eye(3)
         else:
-            matrix[k][:, start[0]] = 0.0, 0.0, 1.0
-        if one.sliding[k + 1]:
-            across = R @ rot_z((offset if k + 2 < m else one.offset)[k + 1])[:3, :3]
-            matrix[k][:, end[0]], matrix[k][:, end[1]], matrix[k][:, end[2]] = -across.T
-        else:
-            matrix[k][:, end[0]] -= R[:, 2]
-    return matrix.reshape(3 * links, count), places
+            near[k, 2, places[k]] = far[k, 2, places[k]] = 1.0
+    turns = _turns_across(other)
+    for link in np.flatnonzero(parallel):
+        turns[link] = np.diag([1.0, 0.0, 0.0]) + np.sign(np.cos(other.alpha[link])) * np.diag([0.0, 1.0, 1.0])
+    spun = exp_rotation(np.append(offset[:-1], one.offset[-1])[1:, None] * np.eye(3)[2])
+    matrix = far[:-1] - turns @ spun @ near[1:]
+    return matrix.reshape(-1, places[-1]), near, far
 
 
 def _entries(
@@ -826,54 +793,38 @@ def _shifts_chosen(
     other: Mechanism,
     gaps: Reals,
     shifts: Parts,
-    places: list[list[int]],
+    sides: tuple[Reals, Reals],
     *,
     turned: Reals,
     tolerances: Tolerances,
-) -> list[tuple[Reals, Reals]]:
-    """The shift (3,), m, on the near and on the far side of each joint, in its own frame.
+) -> tuple[Reals, Reals]:
+    """The shifts (m, 3), m, on the near and on the far side of the joints, in their own frames.
 
     What is free throughout (all axes parallel, or slides at the ends) is chosen so that as few as can be of base,
     zeros and flange differ.
     """
-    m, (U, S, V) = len(one.d), shifts
+    (near, far), (U, S, V) = sides, shifts
     rank = int((S > 1e-9).sum())
     y, free = V[:rank].T @ ((U[:, :rank].T @ gaps) / S[:rank]), V[rank:].T
 
-    def sides(values: Reals) -> list[tuple[Reals, Reals]]:
-        found = []
-        for k in range(m):
-            own = values[places[k]]
-            near = np.array([own[0], own[1], own[2]]) if one.sliding[k] else np.array([0.0, 0.0, own[0]])
-            far = np.array([own[0], own[1], own[3]]) if one.sliding[k] else near
-            found.append((near, far))
-        return found
-
-    if not free.shape[1]:
-        return sides(y)
-
     def outcome(values: Reals) -> Reals:
         """Gaps (m,) left at base (3), joints that slide, flange (3)."""
-        found = sides(values)
-        start = rot_z(one.offset[0] * one.sliding[0])[:3, :3] @ found[0][0]
+        start = rot_z(one.offset[0] * one.sliding[0])[:3, :3] @ near[0] @ values
         at_base = other.base[:3, 3] + other.base[:3, :3] @ start - one.base[:3, 3]
-        at_flange = (rot_z(turned[-1] if m > 1 else 0.0) @ other.flange)[:3, 3] - found[-1][1] - one.flange[:3, 3]
-        return np.concatenate(
-            [at_base, [found[k][1][2] - found[k][0][2] for k in range(m) if one.sliding[k]], at_flange]
-        )
+        at_flange = (rot_z(turned[-1] if len(near) > 1 else 0.0) @ other.flange)[:3, 3] - far[-1] @ values
+        return np.concatenate([at_base, (far - near)[one.sliding, 2] @ values, at_flange - one.flange[:3, 3]])
 
     reference = outcome(y)
-    response = np.stack([outcome(y + free[:, j]) - reference for j in range(free.shape[1])], axis=1)
+    response = np.array([outcome(y + each) - reference for each in free.T]).T
     slides = int(one.sliding.sum())
-    best: tuple[int, Reals] | None = None
-    for spared in ((slides + 3, slides + 6), (3, slides + 3), (0, 3)):
+    best, fewest = y, np.inf
+    for spared in ((slides + 3, slides + 6), (3, slides + 3), (0, 3)) if free.size else ():
         weight = np.ones(slides + 6)
         weight[slice(*spared)] = 1e-5
         step = np.linalg.lstsq(weight[:, None] * response, -weight * reference, rcond=1e-9)[0]
         left = np.abs(reference + response @ step)
         parts = left[:3].max(), *left[3 : 3 + slides].tolist(), left[3 + slides :].max()
         apart = sum(part > tolerances.length for part in parts)
-        if best is None or apart < best[0]:
-            best = apart, y + free @ step
-    assert best is not None
-    return sides(best[1])
+        if apart < fewest:
+            best, fewest = y + free @ step, apart
+    return near @ best, far @ best

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from er3a.comparison.entries import Entry, shifted
-from er3a.diagnosis.fitting import lowered
+from er3a.diagnosis.fitting import arm_lengths, lowered
 from er3a.identifiability.requirements import Asked
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -43,7 +43,7 @@ def largest_length(table: Tables) -> float:
     -------
     length : m, all its lengths together, at least ``MIN_M``
     """
-    return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()), MIN_M)
+    return max(float(arm_lengths(table)[0]), MIN_M)
 
 
 class Region:
