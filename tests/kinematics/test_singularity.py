@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from scipy.interpolate import interp1d
 
 from er3a.errors import NotWristPartitionedError
 from er3a.files.robot_library import load_robot
@@ -17,10 +16,11 @@ from er3a.kinematics.singularity import (
     characteristic_length,
     conditioning,
     determinant_factors,
-    rank_losses,
     scaled_jacobian,
 )
 from er3a.pipeline.teach.panel import panel_data
+from er3a.planning.moves import JointMove
+from er3a.planning.singular_events import singular_events
 from testing.arms import arms, joints_at_random, joints_within, made_of, make_arm, number
 
 
@@ -83,9 +83,9 @@ def test_an_arm_of_five_ways_to_move_is_singular_only_where_it_loses_one(random)
     assert values[:, 5].max() < 1e-12
     assert np.array_equal(USUAL_NEAR.contains(arm, q), values[:, 4] < USUAL_NEAR.smallest)
     assert 0 < USUAL_NEAR.contains(arm, q).sum() < 50
-    t, regular = np.linspace(0, 1, 20), q[np.argsort(values[:, 4])[[-1, -2]]]
-    joints = interp1d([0, 1], regular, axis=0)
-    assert rank_losses(arm, t, joints(t), joints, 1e-3) == []
+    start, end = q[np.argsort(values[:, 4])[[-1, -2]]]
+    move = JointMove(start, end, 1.0)
+    assert singular_events(arm, move.polynomials(), NearSingular(1e-3, 1e-3, 1e-3, 1e-3)) == []
 
 
 def test_factors_change_sign_across_each_singularity(robot):
