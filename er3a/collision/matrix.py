@@ -14,7 +14,8 @@ As MoveIt's setup assistant has it, but that "never" is proven:
   (:mod:`er3a.collision.shapes`): in many of the joint vectors drawn (``POOR_GUESS``), without that region if a joint
   joins them. Hulls and surfaces that a file gives: in ``MOST``, and no joint vector parts them by
   ``ASSUMED_MARGIN``, or they only slide along each other: housings and the stages of a telescope, drawn too large. A
-  link that folds onto another parts from it elsewhere. Not checked, and every result names them;
+  link that folds onto another parts from it elsewhere. Not checked: every result names them, and none passes where
+  a file gives the shapes;
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: checked;

@@ -45,6 +45,7 @@ GAPS: Mapping[str, Check] = {
     "bare_tool": "self_collision",
     "allowed_contacts": "self_collision",
     "wrong_shapes": "self_collision",
+    "coarse_shapes": "self_collision",
     "base_inside": "self_collision",
     "no_scene": "scene_collision",
     "inside_solid": "scene_collision",

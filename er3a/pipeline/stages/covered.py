@@ -73,11 +73,12 @@ def covered_collisions(
         Open("bare_tool", tuple(bare)),
         Open("allowed_contacts", (*by_scene.values(), *allowed)),
         Open("wrong_shapes", tuple(label_of(pair) for pair in bodies.in_error)),
+        Open("coarse_shapes", coarse if shapes.given else ()),
         Open("base_inside", tuple(each.solid for each in contacts if each.inside)),
     )
     assumed = (
         Open("base_contacts", tuple(each.solid for each in contacts if not each.inside)),
-        Open("coarse_pairs", coarse),
+        Open("guessed_pairs", () if shapes.given else coarse),
     )
     count = robot.rows + 2
     open_links = {link_label(link) for link, _ in (*shapes.uncovered, *shapes.partial)}
