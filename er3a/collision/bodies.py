@@ -24,7 +24,16 @@ from er3a.collision.distances import (
 from er3a.collision.matrix import BOXES, MatrixRow, collision_matrix, matrix_of
 from er3a.collision.pairs import BASE, Pair, link_label
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import Body, arm_bodies, carried_bodies, depth_inside, layout_of, link_frames, solid_body
+from er3a.collision.shapes import (
+    Body,
+    arm_bodies,
+    arm_shapes,
+    carried_bodies,
+    depth_inside,
+    layout_of,
+    link_frames,
+    solid_body,
+)
 from er3a.errors import Er3aError
 from er3a.finding import fact
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -46,6 +55,7 @@ class Bodies:
     matrix : what was found of each pair of links
     in_error : pairs whose shapes overlap where no arm's can (:mod:`er3a.collision.matrix`), so that they are left out
     coarse : pairs that are left out because their shapes are too coarse, or too large, there
+    unexamined : pairs that shapes which a file gives leave unchecked; what er3a guesses is an assumption instead
     joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
     layout : the same as arrays, solids among the bodies
     """
@@ -77,6 +87,7 @@ class Bodies:
             )
             for state in ("overlaps", "coarse")
         )
+        self.unexamined = self.in_error + (self.coarse if arm_shapes(robot).given else ())
         links = (body for pair, _ in kept for body in pair)
         number = {body: k for k, body in enumerate(dict.fromkeys((*links, *moving, *solids)))}
         self.all, count = tuple(number), len(number) - len(solids)

@@ -311,8 +311,8 @@ def _located(
     placed = [(each.place, fact("not_followed", text="", reason=each.kind)) for each in execution.cut]
     placed += [(place, fact("not_followed", text=text, reason="unreached")) for place, text in unreached.items()]
     placed += [] if program.motions() else [(top, fact("program_nothing_moves"))]
-    if obstacles is not None and obstacles.bodies.in_error:
-        placed.append((top, fact("pairs_unexamined", pairs=obstacles.bodies.in_error)))
+    if obstacles is not None and (unseen := obstacles.bodies.unexamined):
+        placed.append((top, fact("pairs_unexamined", pairs=unseen)))
     found += [LocatedFinding(level_of(each), each, place) for place, each in placed]
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:

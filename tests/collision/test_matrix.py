@@ -408,6 +408,7 @@ def test_stages_of_a_telescope_drawn_too_large_are_not_checked_and_named():
     assert rows_of(robot)["base", "link_2"].state == "coarse"
     assert bodies.coarse == (fact("link_pair", first=0, second=2),)
     assert Open("coarse_shapes", ("base/link_2",)) in covered_collisions(robot, bodies, None).gaps
+    assert bodies.unexamined == bodies.coarse
 
 
 def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes():
