@@ -120,7 +120,7 @@ NEVER: Mapping[str, str] = words(
         "dynamics": "Never checked: heat, wear, elasticity, and what drives can do at speed.",
         "vision": "Never checked: the detector, torques, and real shapes.",
         "programs": (
-            "Never checked: torques, ways back to a program's start, real shapes, and how a controller rounds and ramps."
+            "Never checked: torques, ways back to the start, real shapes, and how a controller rounds and ramps."
         ),
     }
 )
