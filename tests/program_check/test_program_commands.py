@@ -97,7 +97,7 @@ def test_limits_and_links_that_nothing_is_known_of_are_no_pass(tmp_path):
     words = ("check-program", "data/programs/weld_seam.src", "--robot", str(tmp_path / "er3a_c60.yaml"))
     done = run(*words, "--start", HOME, "--fail-on", "caution")
     assert "would pass" in done.stdout
-    assert "Not checked: " in done.stderr
+    assert "Not fully checked: " in done.stderr
     assert done.exit_code == 1
 
 

@@ -40,7 +40,7 @@ STATUS_MEANINGS = words(
         "settled_up_to_signs": "keep it, unless an open entry turns out otherwise: then a sign may change",
         "weak": "measure it: not known to within the tolerance",
         "contradicted": "don't use it: the evidence excludes the value",
-        "consistent": "check it on the arm: only the table's own source gives it",
+        "consistent": "check it on the arm: only one source gives it",
         "open": "measure it: other values that move the tool fit as well",
         "gauge": "keep it: only its sum with other entries counts",
         "given": "chosen by the author of the file",

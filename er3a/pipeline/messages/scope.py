@@ -68,8 +68,8 @@ GAP_WORDS: Mapping[str, str] = words(
 ASSUMED: Mapping[str, str] = words(
     {
         "own_values": "values of the robot's file that are inferred",
-        "own_speeds": "joint speeds: begin at 10 % override",
-        "own_accelerations": "joint accelerations",
+        "own_speeds": "limits of joint speeds: begin at 10 % override",
+        "own_accelerations": "limits of joint accelerations",
         "tool": "no tool: the flange's centre is the tip",
         "carried": "nothing is carried",
         "guessed_pairs": "pairs of links for which guessed shapes are too coarse",
@@ -82,7 +82,7 @@ ASSUMED: Mapping[str, str] = words(
         "capability": "tool directions were not computed",
         "places": "no place for the tray was looked for",
         "tray_nowhere": "no place for the tray was found",
-        "references": "not compared, as no document states them",
+        "references": "what no document states",
         "loose_references": "references too loose to tell",
         "tool_and_base": "the study's tool and base",
         "link_masses": "links without a mass weigh nothing",
@@ -99,8 +99,8 @@ ASSUMED: Mapping[str, str] = words(
         "open_space": "nothing stands around the arm",
         "mounting": "the base stands upright",
         "real_camera": "the camera is simulated",
-        "joint_zeros": "joint zeros",
-        "small_joint_zeros": "joint zeros are right to {amount:g}°",
+        "joint_zeros": "joint zeros, not tried",
+        "small_joint_zeros": "joint zeros that were tried are right to {amount:g}°",
         "touched_points": "no touched points confirm the result",
         "given_intrinsics": (
             "the intrinsics are exact (a principal point 1 % of the focal length off turns the camera 0.6°)"
@@ -112,16 +112,16 @@ ASSUMED: Mapping[str, str] = words(
 NEVER: Mapping[str, str] = words(
     {
         "validation": "Never checked: how the arm at hand differs from its table. A calibration measures that.",
-        "workspace": "Never checked: collisions along the way to a point, and points between those sampled.",
-        "inverse": "Never checked: the motions from one target to the next.",
+        "workspace": "Never checked: collisions along the way to a point, points between samples, real shapes.",
+        "inverse": "Never checked: the motions from one target to the next, and real shapes.",
         "trajectory": (
             "Never checked: torques, the ways between paths, real shapes, and how a controller rounds and ramps."
         ),
         "collision": "Never checked: real shapes; links where a joint joins them; joint space between samples.",
         "dynamics": "Never checked: heat, wear, elasticity, and what drives can do at speed.",
-        "vision": "Never checked: the detector, the part in the gripper, and torques.",
+        "vision": "Never checked: the detector, torques, and real shapes.",
         "programs": (
-            "Never checked: torques, the way back to a program's start, and how a controller rounds and ramps."
+            "Never checked: torques, ways back to the start, real shapes, and how a controller rounds and ramps."
         ),
     }
 )
@@ -129,7 +129,7 @@ NEVER: Mapping[str, str] = words(
 TEXTS = texts(
     {
         "link": "[base{base:?}][{base:!}link {number}]",
-        "not_checked": "Not checked: {checks:missed; }.",
+        "not_checked": "Not fully checked: {checks:missed; }.",
         "not_checked.one": "{check}: {gaps}",
         "coverage": "[all {of}{all:?}][none{none:?}][{part:?}{covered} of {of}]",
     }

@@ -9,7 +9,6 @@ from er3a.by_value import frozen
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.dynamics import payload_key
 from er3a.pipeline.messages.say import joined
-from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import ProgramsResults
@@ -22,7 +21,6 @@ from er3a.pipeline.stages.workspace.page.tray import placing_of
 from er3a.pipeline.stages.workspace.page.workspace_figures import about, if_normal, void_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import ListRow, Mark
-from er3a.pipeline.viewing.page import whole_sentence
 
 Results = Mapping[str, Stored[Any]]
 FEW = 7  # rows of a tile: so many are seen whole on the first screen
@@ -93,7 +91,7 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     good = joined([row.name for row in rows if row.mark == "pass"], ", ")
     others = [row for row in rows if row.mark != "pass"]
     page = f"{name}/{found.stage}.html"
-    asked = tr("Which {what} may run?", what=what)
+    asked = tr("In the model: {what}", what=what)
     return Tile(asked, said.headline, good, sound, page, rows=others[:FEW], all=len(others), heading=said.rest)
 
 
@@ -105,19 +103,6 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     robot, results = study.robot(name), stored["workspace"].results
     drawing = from_above(robot, results, study.scene(name, "capability"), placing.tray, LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
-    answer = tr("Centre (x, y, z) {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
-    voids = [
-        (about(void), if_normal(void, void_name(k, void)))
-        for k, void in enumerate(results.summary.voids, 1)
-        if void.kind == "enclosed"
-    ]
-    keys, page = [payload_key(known, robot), *voids[:1]], f"{name}/workspace.html"
-    return Tile(
-        tr("Where the tray goes"),
-        answer,
-        whole_sentence(placing.tray.where),
-        "pass",
-        page,
-        drawing=drawing,
-        keys=keys,
-    )
+    voids = [(about(void), if_normal(void, void_name(k, void))) for k, void in enumerate(results.summary.voids, 1)]
+    keys, page = [payload_key(known, robot), *voids[:2]], f"{name}/workspace.html"
+    return Tile(tr("Where the tray goes"), placing.tray.place_text, "", "pass", page, drawing=drawing, keys=keys)

@@ -62,6 +62,7 @@ VERDICT_WORDS = {
     "conflict": N_("conflict"),
 }
 
+UNSAID = ("round_trips", "units")  # of er3a itself and of files: a reader learns nothing from their passing
 PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("Teach panel")}
 SCRIPT_WORDS = {
     "show": N_("Show it"),
@@ -227,17 +228,6 @@ class Head:
         """Why checks that the verdict needs don't cover all."""
         return [gap_text(gap) for each in self.summary.verdict.missed for gap in each.gaps]
 
-    @property
-    def banner(self) -> str:
-        """On what assumed shapes all rests, as the text ends; empty where no shapes are assumed."""
-        shapes = self.summary.verdict.shapes
-        return say(shapes) if shapes else ""
-
-    @property
-    def own_text(self) -> str:
-        """The verdict's text without what stands in the banner."""
-        return self.text.removesuffix(self.banner).rstrip()
-
 
 def head_of(stored: Stored[Any]) -> Head:
     """The head of a stage's page.
@@ -265,6 +255,7 @@ def head_of(stored: Stored[Any]) -> Head:
     checked = tuple(
         (check_name(each.check), covered_text(each), joined([gap_text(gap, None) for gap in each.gaps], ", "))
         for each in summary.checked
+        if each.check not in UNSAID or each.gaps
     )
     return Head(
         stored.robot,
@@ -611,5 +602,5 @@ def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> 
     output : the page, written whole or not at all
     """
     framed = _framed(study, stored)
-    answer = Answer(tr("Not computed."), below=framed["head"].own_text)
+    answer = Answer(tr("Not computed."), below=framed["head"].text)
     render(_HERE / "absent.html.j2", output, answer=answer, never="", **framed)

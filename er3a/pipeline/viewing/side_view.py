@@ -128,7 +128,7 @@ def through_floor(arms: Sequence[SeenArm], floor_mm: float | None) -> list[Label
     """A word at the lowest point of each arm that is lower than the floor; None: there is no floor."""
     lowest = [arm.points_mm[arm.points_mm[:, 1].argmin()] for arm in arms]
     aside, said = [BONE * float(np.ptp(_corners(arms)[:, 1])), 0.0], tr("through the floor")
-    return [Label(said, at + aside, "wrong") for at in lowest if floor_mm is not None and at[1] < floor_mm]
+    return [Label(said, at + aside, "wrong", start=at) for at in lowest if floor_mm is not None and at[1] < floor_mm]
 
 
 def dimension(far: float, low: float, high: float, kind: LabelKind) -> list[DrawnLine]:

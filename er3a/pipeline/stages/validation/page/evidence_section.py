@@ -39,7 +39,7 @@ LOOKS: Mapping[Status, str] = {
 LEGEND = {
     "sound": N_("✓ {count} keep"),
     "open": N_("? {count} confirm"),
-    "wrong": N_("✗ {count} wrong → instead"),
+    "wrong": N_("✗ {count} wrong → instead (?: confirm)"),
     "free": N_("{count} free"),
 }
 MARKS = {"sound": "✓", "open": "?", "wrong": "✗", "free": "–"}
@@ -248,15 +248,19 @@ def _said(each: EntryEvidence, evidence: TableEvidence, proposals: Mapping[str, 
     other, status = _other_given(each, evidence), status_of(each)
     first = word("status_meaning", STATUS_MEANINGS, status)
     if other:
-        text = N_("it is {value}") if status == "contradicted" else N_("it could be {value}")
+        known = N_("it is {value}") if each.by[1:] else N_("by one document it is {value}: confirm it")
+        text = known if status == "contradicted" else N_("it could be {value}")
         first = tr(text, value=with_unit(other, each.unit))
     said = map(whole_sentence, filter(None, (first, proposals.get(each.entry, ""))))
     return joined([entry_word(each.entry), joined(said, " ")], ": ")
 
 
 def status_of(each: EntryEvidence) -> Status:
-    """What is known of an entry; a direction is a sign, and so settled as a whole."""
-    return "settled" if each.status == "settled_up_to_signs" and column_of(each.entry) == "direction" else each.status
+    """What is known of an entry; a direction is a sign, and so settled as a whole, but not by one document: the table
+    that was made from this document asks to confirm it."""
+    if column_of(each.entry) != "direction" or not each.status.startswith("settled"):
+        return each.status
+    return "settled" if each.by[1:] else "consistent"
 
 
 def _status(status: Status) -> str:

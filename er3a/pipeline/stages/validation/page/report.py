@@ -193,7 +193,7 @@ def _both_arms(
     for entry, cell in cells.items():
         column, kind, gives = column_of(entry), cell["look"], cell["gives"]
         if column == "direction" and kind == "open":
-            if disputed:  # what is asked is a length
+            if disputed or off:  # what is asked is a length, or another table
                 continue
             turn = _turn_arrow(robot, q, entry, lines[entry][0], radius)
             over.append(replace(turn, points=_headed(turn.points[::-1], radius)) if cell["status"] == "open" else turn)

@@ -189,6 +189,7 @@ def labelled(
         if arms[1:]:  # words at the side say how far
             said = joined([own_title(robot.title), millimetres([summary.reach_m.furthest_from_axis])], ": ")
             labels.append(Label(with_unit(said, "mm"), np.array([far, height]), kind))
+            over += dimension(far, height, height, kind)[:1]
             continue
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([far / 2, below - BELOW * far]), kind, "reach"))
