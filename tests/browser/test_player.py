@@ -224,15 +224,15 @@ def test_it_tells_the_joint_values_and_how_far_each_is_from_its_nearer_limit(use
     assert told[0][1].endswith("to limit")
 
 
-NEAREST = "return document.querySelector('.player .joints .nearest').textContent"
+NEAREST = "return document.querySelector('.player .ranges .least + b').textContent"
 SIGN = "return getComputedStyle(document.querySelector('.player .joints .least .room'), '::before').content"
 
 
-def test_without_a_fault_the_joint_nearest_its_limit_is_named_and_bears_no_sign_of_one(used):
+def test_without_a_fault_the_joint_nearest_its_limit_is_marked_and_bears_no_sign_of_one(used):
     at_the_event(used)
     cells = used.execute_script(JOINTS)
     (least,) = (j for j, (_, _, mark) in enumerate(cells, 1) if mark == "least")
-    assert used.execute_script(NEAREST) == f"Nearest its limit: J{least}, {cells[least - 1][1].split()[0]}°."
+    assert used.execute_script(NEAREST) == cells[least - 1][0]
     assert used.execute_script(SIGN) == "none"
 
 

@@ -48,6 +48,13 @@ def test_weight_times_lever_is_the_moment_that_the_joint_holds(joint):
     far = np.linalg.norm(np.subtract(lever.end, lever.start))
     assert kg * far == pytest.approx(moment_kg_m(joint), rel=1e-6)
     assert lever.start[2] == pytest.approx(lever.end[2], abs=1e-12)
+    poses = poses_at(ROBOT, np.radians(Q_DEG))
+    parts = [
+        each.mass_kg * (poses[each.link] @ [*(np.array(each.centre_mm) / 1000), 1])[2]
+        for each in LINKS
+        if each.link >= joint
+    ]
+    assert weight.start[2] == pytest.approx(sum(parts) / kg, abs=1e-9)
     assert (lever.text, weight.text) == (f"{1000 * far:.0f} mm", f"{kg:.2f} kg")
 
 

@@ -131,7 +131,7 @@ TEXTS = texts(
         "link": "[base{base:?}][{base:!}link {number}]",
         "not_checked": "Not fully checked: {checks:missed; }.",
         "not_checked.one": "{check}: {gaps}",
-        "coverage": "[all {of}{all:?}][none{none:?}][{part:?}{covered} of {of}]",
+        "coverage": "[all {of}{all:?}][none{none:?}][not all{some:?}][{part:?}{covered} of {of}]",
     }
 )
 
@@ -174,7 +174,8 @@ def check_name(check: Check) -> str:
 def covered_text(found: Coverage) -> str:
     """How much a check covers: all, none, or how many of how many."""
     whole, covered = found.complete, found.covered
-    marks = {"all": whole, "none": not (whole or covered), "part": covered and not whole}
+    part = {"some": not whole and 0 < covered == found.of, "part": 0 < covered < found.of}
+    marks = {"all": whole, "none": not (whole or covered), **part}
     return sentence("coverage", covered=covered, of=found.of, **marks)
 
 

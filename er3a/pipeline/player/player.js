@@ -234,8 +234,7 @@ function failing() {
   return new Map(now.flatMap(({ status, joints }) => joints.map(([j, needed]) => [j, { status, needed }])));
 }
 
-/** Joint values with their margins; those that fail are marked, or else the least of those in deg, and of those in mm, is
- * named. */
+/** Joint values with their margins; those that fail are marked, or else the least of those in deg, and of those in mm. */
 function tellJoints() {
   const values = valuesAt(motion.times, motion.values[0], t).map((value, j) => value * (table.slides[j] ? 1000 : 180 / Math.PI));
   const rooms = data.joints.map(({ lower, upper }, i) => (lower === null ? Infinity : Math.min(values[i] - lower, upper - values[i])));
@@ -244,8 +243,6 @@ function tellJoints() {
   const least = new Map();
   data.joints.forEach(({ unit }, i) => (rooms[i] < (rooms[least.get(unit)] ?? Infinity) ? least.set(unit, i) : null));
   const withUnit = (value, unit) => fixed(value, 1) + (unit === "°" ? unit : ` ${unit}`);
-  const nearest = [...least].filter(([, i]) => quiet && rooms[i] > -0.05).map(([unit, i]) => words.nearest_joint.replace("{joint}", `J${i + 1}`).replace("{room}", withUnit(rooms[i], unit)));
-  show(part("nearest"), nearest.length ? words.nearest.replace("{joints}", nearest.join(words.between)) : "");
   data.joints.forEach(({ unit, lower, upper }, i) => {
     const fault = fails.get(i + 1);
     const past = rooms[i] <= -0.05; // what one decimal shows
@@ -255,6 +252,7 @@ function tellJoints() {
     cells[i].place.classList.toggle("least", quiet && least.get(unit) === i);
     cells[i].place.classList.toggle("doubtful", fault?.status === "caution");
     cells[i].place.classList.toggle("past", past || (fault !== undefined && fault.status !== "caution"));
+    show(ranges[i].nextElementSibling, withUnit(values[i], unit));
     ranges[i].className = cells[i].place.className;
     ranges[i].style.setProperty("--at", rooms[i] === Infinity ? 0.5 : Math.min(1.04, Math.max(-0.04, (values[i] - lower) / (upper - lower || 1))));
   });

@@ -16,13 +16,11 @@ NARROWEST = 0.04  # of a bar, at which a moment is still seen
 
 @frozen
 class Part:
-    """A stretch of a bar, from ``start`` to ``end`` in parts of the row's own length, in the colour of a mark, or in
-    a ``colour`` of its own (``#rrggbb``)."""
+    """A stretch of a bar, from ``start`` to ``end`` in parts of the row's own length, in the colour of a mark."""
 
     start: float
     end: float
     mark: PartMark
-    colour: str = ""
 
     @property
     def left(self) -> float:

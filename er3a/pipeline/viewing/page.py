@@ -391,7 +391,7 @@ def render_stage(
     stage, framed = stored.stage, _framed(study, stored)
     head = framed["head"]
     if head.status == "caution" and head.gaps and stage != "validation":  # whose own headline says what is open
-        below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
+        below = joined([whole_sentence(joined(dict.fromkeys(head.gaps), ", ")), answer.below], " ")
         answer = replace(answer, rest=tr("Not fully checked."), below=below, good=head.summary.verdict.lowered)
     if head.no_verdict:
         said = answer if not answer.headline else Answer("", tr("Nothing here holds for this robot."))

@@ -219,7 +219,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         *of_file,
         *open_of_calibration(samples, head, images, with_zeros, task_file.gripper.tolerance_mm),
         *gaps_in_solids(scene, cell.places_asked()),
-        *(() if scene and scene.carried else (Open("gripper"),)),
+        *(() if scene and scene.carried else (Open("gripper"), Open("bare_tool"))),
     )
     gaps = (*seen.gaps, *(each for each in open_points if each.reason in GAPS))
     judged = Verdict("fail", doubt) if doubt else verdict_of(calibration, objects, near)

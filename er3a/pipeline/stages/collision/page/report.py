@@ -88,24 +88,24 @@ def _answer(
         [row for row in rows if row.mark in marks]
         for marks in (("fail",), ("pass", "caution", "no_reference"), ("none",))
     )
+    failing = sum(row.mark == "no_reference" for row in clear)
     counted = (
+        (N_("{count} more clear, but failing at Paths."), failing),
         (N_("{count} paths can't be reached whole."), len(partly)),
         (N_("{count} targets collide in every solution."), blocked := len(params.get("blocked", ()))),
     )
-    paths = sum(each.kind == "path" for each, row in zip(closest, rows) if row in clear)
+    sound = len(clear) - failing
+    paths = sum(each.kind == "path" for each, row in zip(closest, rows) if row in clear) - failing
     caught = len(params.get("demonstrations", ()))
-    due = len(rows) + blocked - caught - len(partly)
-    headline = tr("{count} of {due} poses and paths clear.", count=len(clear), due=due)
-    if due == len(clear) > 0:
+    due = len(rows) + blocked - caught - len(partly) - failing
+    headline = tr("{count} of {due} poses and paths clear.", count=sound, due=due)
+    if due == sound > 0:
         headline = tr("{poses} poses and {paths} paths clear.", poses=due - paths, paths=paths)
     keys = [
         (with_unit(fixed(each.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=each.name))
         for each in closest
         if each.clearance_mm >= 0
     ][:1]
-    free = next((each.value for each in summary.figures if each.name == "free_of_collisions"), None)
-    if free is not None:
-        keys.append((with_unit(fixed(free, 0), "%"), tr("joint space free")))
     titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
     return Answer(
         headline,

@@ -12,7 +12,8 @@ from er3a.pipeline.messages.numbers import decimals_of, fixed, number
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.dynamics.model import DynamicsResults, HoldingTorque, JointLoad, LinkEntry, MassesUsed
-from er3a.pipeline.viewing.drawn import poses_at
+from er3a.pipeline.viewing.drawn import drawn_arm, poses_at
+from er3a.pipeline.viewing.still import AZIMUTH, axes_of
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -63,34 +64,36 @@ def hanging(
     Returns
     -------
     links : k links with a mass, none for other joints
-    axis : (3,), m, a point of the axis
+    axis : (3,), m, the end of the axis that the eye sees
     kg : (k,)
-    off : (k, 3), m, the level way from the axis to each centre
+    off : (k, 3), m, the way from the axis to each centre, at a right angle to it
     """
     poses = poses_at(robot, meant(robot, np.array(held.q)))
-    axis, at = poses[held.joint, :3, 2], poses[held.joint, :3, 3]
+    axis, row = poses[held.joint, :3, 2], drawn_arm(robot)["rows"][held.joint - 1]
+    at = (poses[held.joint] @ [*row["middle"], 1.0])[:3] - row["half"] * np.sign(axis @ axes_of(AZIMUTH, 0.0)[2]) * axis
     links = [each for each in masses.links if each.link >= held.joint and each.mass_kg] if masses else []
     if not masses or masses.load_kg or abs(axis[2]) > LEVEL or robot.slides[held.joint - 1]:
         links = []
     ways = np.array([(poses[each.link] @ [*each.centre_mm, MM])[:3] / MM - at for each in links]).reshape(-1, 3)
-    off = (ways - np.outer(ways @ axis, axis)) * [1, 1, 0]
+    off = ways - np.outer(ways @ axis, axis)
     return links, at, np.array([each.mass_kg for each in links]), off
 
 
 def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> list[Mark]:
-    """The weight that a joint holds, and its level distance from the axis."""
+    """The weight that a joint holds, from the centre of gravity down, and its level distance from the axis."""
     links, at, kg, off = hanging(robot, masses, held)
     if not links:
         return []
-    lever = kg @ off / kg.sum()
-    over = np.array([0.0, 0.0, ABOVE_M])
+    centre = at + kg @ off / kg.sum()
+    lever = (centre - at) * [1, 1, 0]
+    top = np.add(at, [0, 0, ABOVE_M])
     far, heavy = with_unit(fixed(MM * float(np.linalg.norm(lever)), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
-    under, tip = at + lever - over, at + lever - over - [0, 0, DROP_M]
+    tip = centre - [0, 0, DROP_M]
     aside = HEAD_M * lever / np.linalg.norm(lever)
     head = [Mark(0.0, 1.0, tuple(tip), tuple(tip + way - [0, 0, -HEAD_M]), "") for way in (aside, -aside)]
-    sides = [Mark(0.0, 1.0, tuple(each), tuple(each + over), "") for each in (at, at + lever)]
-    level = Mark(0.0, 1.0, tuple(at + over), tuple(at + lever + over), far)
-    return [level, Mark(0.0, 1.0, tuple(under), tuple(tip), heavy), *sides, *head]
+    sides = [Mark(0.0, 1.0, tuple(at), tuple(top), ""), Mark(0.0, 1.0, tuple(centre), tuple(top + lever), "")]
+    level = Mark(0.0, 1.0, tuple(top), tuple(top + lever), far)
+    return [level, Mark(0.0, 1.0, tuple(centre), tuple(tip), heavy), *sides, *head]
 
 
 def within(value: float, tolerance: float, decimals: int = 2) -> str:

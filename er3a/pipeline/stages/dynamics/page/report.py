@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -18,7 +19,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, holding_text, motions, within
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, PartMark
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
 from er3a.pipeline.viewing.figures import SIDE, axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import JOINTS
@@ -56,14 +57,14 @@ def held_parts(robot: Robot, masses: model.MassesUsed | None, held: model.Holdin
     links, _, kg, off = hanging(robot, masses, held)
     if not links:
         return None
-    lever = kg @ off
+    lever = kg @ off * [1, 1, 0]
     far = off @ lever / np.linalg.norm(lever)
     torques = abs(held.torque) * kg * far / (kg @ far)
     rows = []
     for each, torque, mass, way in zip(links, torques, kg, far):
         name = joined([tr("link {number}", number=each.link), with_unit(fixed(torque, 1), held.unit)], ": ")
         note = f"{with_unit(number(mass, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}"
-        part = Part(0.0, max(0.0, torque / torques.max()), "none", JOINTS[held.joint - 1])
+        part = Part(0.0, max(0.0, torque / torques.max()), "none")
         rows.append(ListRow("none", name, note, length=1.0, parts=[part]))
     return Group(tr("Link mass × level distance to J{joint}.", joint=held.joint), rows, counted=False)
 
@@ -197,7 +198,7 @@ def _limited(summary: model.DynamicsSummary) -> bool:
     return all(motor.peak_limit is not None for motor in summary.motors)
 
 
-def _mark(motor: model.MotorNeed) -> Mark:
+def _mark(motor: model.MotorNeed) -> Literal["pass", "fail", "none"]:
     """Whether a joint's greatest torque is within its limit; ``none`` where that is not known."""
     if motor.peak_limit is None:
         return "none"
@@ -217,9 +218,7 @@ def _row(
     if limit:
         value = tr("{value} of {limit}", value=value, limit=number(limit, 2))
     mark = _mark(motor) if limit else "none"
-    own: PartMark = "fail" if mark == "fail" else "pass"
-    colour = "" if limit else JOINTS[motor.joint - 1]
-    parts = [Part(0.0, share, own, colour), Part(share, 1.0, "rest"), Part(share - spread, share + spread, "spread")]
+    parts = [Part(0.0, share, mark), Part(share, 1.0, "rest"), Part(share - spread, share + spread, "spread")]
     return ListRow(mark, name, with_unit(value, motor.unit), f"#{moment[0]}", moment, 1.0, parts)
 
 

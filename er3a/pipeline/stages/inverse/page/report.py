@@ -90,9 +90,6 @@ def _answer(targets: model.TargetRows, shown: Sequence[model.TargetResult]) -> A
     headline = tr("{count} of {due} poses reached.", count=targets.reached.sum(), due=len(targets) - caught)
     clear = targets.clearance_mm[np.isfinite(targets.clearance_mm)]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if len(clear) else []
-    if solved := sum(each.solutions for each in shown):
-        usable = sum(each.within_limits for each in shown)
-        keys.append((f"{usable}/{solved}", tr("within the limits")))
     rows = [_row(each) for each in shown]
     return Answer(
         headline,

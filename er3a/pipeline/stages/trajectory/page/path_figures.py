@@ -52,16 +52,16 @@ def nearness_picture(
     ----------
     rows : of the motion
     shapes : the assumed ones, which may be wrong by their margin; None where none are assumed
-    path : whose faults are marked; None of a motion that repairs them
+    path : whose faults are marked, if it has any; None of a motion that repairs them
     """
     figure, ax = new_figure(width=SIDE, height=2.0)
     ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
-    if path:
+    if path and path.verdict != "safe":
         _mark(ax, path)
     ax.axhline(0.0, color=palette.TOUCHING, linewidth=1.2)
     if shapes:
         margin = shapes.margin_mm
-        text = tr("assumed shapes may be off by {mm:g} mm", mm=margin)
+        text = tr("shapes assumed: ± {mm:g} mm", mm=margin)
         ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.45, linewidth=0, label=text)
     _key(ax)
     ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)

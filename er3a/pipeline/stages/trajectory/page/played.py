@@ -310,12 +310,12 @@ def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> F
 
 
 def events(path: model.PathSummary) -> list[PlayedEvent]:
-    """Singular poses and faults of a path."""
+    """Singular poses and faults of a path; none of one that passes: joint moves pass singular poses unharmed."""
     faults = [(outcome_word(kind), part) for kind, own in by_kind(path.faults).items() for part in own]
-    weight: Weight = "plain" if path.verdict == "safe" else "caution"  # of a pass by a singular pose
     return [
-        PlayedEvent(s.t_s, s.until_s, _singular(s), weight, axes=s.axes or SINGULAR_AXES.get(s.type, ()))
+        PlayedEvent(s.t_s, s.until_s, _singular(s), "caution", axes=s.axes or SINGULAR_AXES.get(s.type, ()))
         for s in path.singularities
+        if path.verdict != "safe"
     ] + [
         PlayedEvent(
             s.t0_s,

@@ -135,8 +135,6 @@ def answer_of(
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance of passing paths"))] if clear else []
-    if speeds := [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio is not None]:
-        keys.append((f"{fixed(100 * max(speeds), 0)} %", tr("speed / limit")))
     doubts = sum(row.mark == "caution" and not wrong[row.name].meant for row in fault_rows)
     doubted = tr("{count} in doubt.", count=doubts) if doubts else ""
     fixes = {row.name: row.fix for row in (*fault_rows, *repairable)}

@@ -74,7 +74,9 @@ def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Real
         return at_rest(robot, each.name, refusal_text(each), "fail", q, bodies, marks=[mark])
     parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
     events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
-    text = tr("{grasp}, turned by {turn}°", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
+    text = tr("At the grasp: {grasp}, turned by {turn}°", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
+    there = grasp_moment(results, each)[1]
+    events.append(PlayedEvent(there, there, text, "plain"))
     return PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events)
 
 

@@ -43,6 +43,7 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 MAX_IMAGES = 9
 WIDEST_PX = 480
 ARROW_PX = 30.0
+CUT = 0.9  # of the height of a figure, where bars end that are longer than it
 
 
 def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> Picture:
@@ -50,10 +51,13 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
     size, mean, order = np.linalg.norm(rows.residual_mm, axis=1), 1.6 * found.camera_mm, np.arange(1, len(rows) + 1)
     figure, ax = new_figure(width=SIDE, height=1.9)
     ax.bar(order[rows.used], size[rows.used], color=MODEL, label=tr("used"))
-    ax.bar(order[~rows.used], size[~rows.used], color=HIGHLIGHT, label=tr("left out"))
     ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("expected mean"))
     top = 1.3 * max(mean, size[rows.used].max(initial=0.0))
-    for k in np.flatnonzero(size > top):
+    cut = size > top  # these end in an arrow
+    drawn = np.where(cut, CUT * top, size)
+    ax.bar(order[~rows.used], drawn[~rows.used], color=HIGHLIGHT, label=tr("left out"))
+    ax.plot(order[cut], drawn[cut], "^", color=HIGHLIGHT, markersize=11)
+    for k in np.flatnonzero(cut):
         side = "right" if 2 * k > len(rows) else "left"
         text = joined([rows.sample[k], with_unit(number(size[k], 3), "mm")], ": ")
         shift = (-8 if side == "right" else 8, -4)
@@ -120,7 +124,7 @@ def _errors(each: model.ObjectResult | None, task: VisionFile) -> list[Group]:
     """By how much the tool misses an object, and by what cause: bars to one scale, with the gripper's tolerance."""
     if each is None or not each.error_mm:
         return []
-    limit, turn = min(task.gripper.tolerance_mm), min(task.gripper.tolerance_deg)
+    limit = min(task.gripper.tolerance_mm)
     mm, rows = each.error_mm, list[ListRow]()
     scale = 1.1 * max(limit, mm.together)
     for part, cause in PARTS.items():
@@ -129,9 +133,7 @@ def _errors(each: model.ObjectResult | None, task: VisionFile) -> list[Group]:
         text = f"{fixed(off, 2)} mm, {fixed(getattr(each.error_deg, part), 2)}°"
         parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
         rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
-    allowed = [Part(limit / scale, 1.0, "rest")]
-    rows.append(ListRow("none", tr("tolerance"), f"{limit:g} mm, {turn:g}°", length=1.0, parts=allowed))
-    title = tr("{name}: error, 95 % of grasps", name=each.name)
+    title = tr("{name}: error, 95 % of grasps; line: {limit:g} mm allowed", name=each.name, limit=limit)
     return [Group(title, rows, counted=False)]
 
 
@@ -190,13 +192,13 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     headline = tr("{count} of {all} objects can be grasped.", count=len(grasped), all=len(objects) - caught)
     if not objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
-    keys, limit = list[tuple[str, str]](), min(task.gripper.tolerance_mm)
+    keys, limit, turn = list[tuple[str, str]](), min(task.gripper.tolerance_mm), min(task.gripper.tolerance_deg)
     least = _least_sure(objects)
     if least and least.grasp and least.error_mm:
-        allowed = tr("{limit} allowed", limit=with_unit(f"{limit:g}", "mm"))
-        made = joined([allowed, tr("simulated") if found and found.simulated else ""], ", ")
+        made = joined([tr("in 95 % of grasps"), tr("simulated") if found and found.simulated else ""], ", ")
+        allowed = tr("within {limit:g} mm, {turn:g}°: {name}", limit=limit, turn=turn, name=least.name)
         keys = [
-            (f"{fixed(100 * least.grasp.probability, 1)} %", tr("least success: {name}", name=least.name)),
+            (f"{fixed(100 * least.grasp.probability, 1)} %", allowed),
             (tr("{far} off", far=with_unit(fixed(least.error_mm.together, 1), "mm")), made),
         ]
     elif found:

@@ -88,7 +88,7 @@ def _answer(
     keys = [
         (
             with_unit(fixed(volume.middle, 2), "m³"),
-            tr("{low} to {high} m³, proven", low=at_least(volume.lower, "m³"), high=at_most(volume.upper, "m³")),
+            tr("reached: {low} to {high} m³", low=at_least(volume.lower, "m³"), high=at_most(volume.upper, "m³")),
         ),
         payload,
     ]

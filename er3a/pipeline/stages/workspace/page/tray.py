@@ -83,11 +83,11 @@ class Tray:
 
     @property
     def place_text(self) -> str:
-        """Its centre seen from above, and how high its stand is, or else what it is on."""
+        """Its edges, its centre, and how high its stand is, or else what it is on."""
         if self.floor is None:
             return whole_sentence(self.where)
-        x, y, gap = (millimetres([each]) for each in (*self.place.centre_m[:2], self.low[2] - self.floor))
-        return tr("Tray: x {x}, y {y}, stand {gap} mm.", x=x, y=y, gap=gap)
+        centre, gap = millimetres(self.place.centre_m), millimetres([self.low[2] - self.floor])
+        return tr("Tray {size} at ({centre}), stand {gap} mm.", size=self.edges, centre=centre, gap=gap)
 
     @property
     def where(self) -> str:
