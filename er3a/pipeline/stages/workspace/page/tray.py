@@ -83,11 +83,11 @@ class Tray:
 
     @property
     def place_text(self) -> str:
-        """Its edges, its centre, and how high its stand is, or else what it is on."""
+        """Its centre, and how high its stand is, or else what it is on."""
         if self.floor is None:
             return whole_sentence(self.where)
         centre, gap = millimetres(self.place.centre_m), millimetres([self.low[2] - self.floor])
-        return tr("Tray {size} at ({centre}), stand {gap} mm.", size=self.edges, centre=centre, gap=gap)
+        return tr("Tray at ({centre}), stand {gap} mm.", centre=centre, gap=gap)
 
     @property
     def where(self) -> str:
