@@ -81,10 +81,9 @@ def _answer(
     # The void that the picture shows comes first.
     in_order = sorted(enumerate(summary.voids, 1), key=lambda each: each[1].kind != "enclosed")
     volume, voids = summary.volume_m3, [_void_as_row(*each) for each in in_order]
-    said, fix, measured = [whole_sentence(reaches(summary))], None, tr("Distances are from axis 1.")
+    said, fix = [whole_sentence(reaches(summary))], None
     if placing and rows[0].mark == "pass":
         said.append(placing.tray.place_text)
-        measured = joined([tr("The tray's edges are {size} mm.", size=placing.tray.edges), measured], " ")
         fix = Fix(tr("add the tray and its stand to the scene."), "#tray-1", False)
     keys = [
         (
@@ -94,7 +93,7 @@ def _answer(
         payload,
     ]
     groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
-    return Answer(joined(said, " "), "", measured, keys, groups, fix)
+    return Answer(joined(said, " "), "", tr("Distances are from axis 1."), keys, groups, fix)
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
