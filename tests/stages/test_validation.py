@@ -439,9 +439,8 @@ def test_every_count_of_checks_is_of_one_scheme(study, stored, summaries, tmp_pa
         for each in (found.counts.independent, found.counts.consistency, found.counts.claims)
     }
     assert set(shown) <= scheme
-    keys = re.findall(r"<dd>(\d+)/(\d+)</dd><dt>independent checks pass</dt>", page)
     passed, total = counts["independent"].passed, counts["independent"].total
-    assert keys == [(str(passed), str(total))] * (passed < total)
+    assert f">{passed}/{total}<" in page
     failed = sum(check.status == "fail" for check in summary.checks)
     assert re.findall(r"<summary>(\d+) that fails?[^<]*</summary>", page) == [str(failed)] * bool(failed)
 

@@ -73,7 +73,7 @@ IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta",
 
 def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
-    legend, and the entries in words; rows of entries begin with the name, which is the address on the page. Those
+    legend, and the entries in words; the addresses of rows are names of entries. Those
     not settled come by how far the tool may be off, then those without a bound, then those that don't move it;
     ``first``: the worst of those that evidence contradicts, or else what to do."""
     if evidence is None:
@@ -85,6 +85,7 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
     left.sort(key=lambda each: (not each.off.moves, _unbounded(each), -each.off.mm, -each.off.deg))
+    listed = [*left, *(each for each in numbers if each.status in SETTLED)]
     proposals = {proposal.entry: to_settle(proposal) for proposal in evidence.proposals}
     todo = {each.entry: proposals[each.entry] for each in evidence.proposals if not is_one(each, "look_at_motion")}
     counts = Counter(LOOKS[status_of(each)] for each in evidence.entries if each.value is not None)
@@ -100,10 +101,8 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
             if status in present
         ],
         open_columns=OPEN_COLUMNS,
-        open_rows=[
-            [*_row(each, evidence), _tool_off(each), proposals.get(each.entry, "–")]
-            for each in (*left, *(each for each in numbers if each.status in SETTLED))
-        ],
+        open_entries=[each.entry for each in listed],
+        open_rows=[[*_row(each, evidence), _tool_off(each), proposals.get(each.entry, "–")] for each in listed],
         looks=[each for each in evidence.proposals if is_one(each, "look_at_motion")],
         first=first if evidence.contradicted else to_confirm(evidence),
     )
