@@ -257,7 +257,7 @@ def _said(each: EntryEvidence, evidence: TableEvidence, proposals: Mapping[str, 
 def status_of(each: EntryEvidence) -> Status:
     """What is known of an entry; a direction is a sign, and so settled as a whole, but not by one document: the table
     that was made from this document asks to confirm it."""
-    if column_of(each.entry) != "direction" or not each.status.startswith("settled"):
+    if column_of(each.entry) != "direction" or LOOKS[each.status] != "sound":
         return each.status
     return "settled" if each.by[1:] else "consistent"
 
