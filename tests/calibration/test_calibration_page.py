@@ -49,7 +49,7 @@ def test_the_page_hands_out_the_corrected_robot(written):
     q = np.random.default_rng(1).uniform(-1, 1, (20, 7))
     assert er3a.forward(given, q) == pytest.approx(er3a.forward(mine, q), abs=1e-12)
     assert '<html lang="zh-CN">' in page
-    assert "保留的 20 个位置" in page
+    assert "留出的 20 个位置" in page
 
 
 def test_each_word_of_the_page_can_be_translated(written, tmp_path):

@@ -139,7 +139,7 @@ def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows)
         position=_listed(target.xyz_mm),
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),
-        start=_joints(target.q_ref_deg) if any(target.q_ref_deg) else tr("zero"),
+        start=_listed(target.q_ref_deg) if any(target.q_ref_deg) else tr("zero"),
         reason=say(target.reason),
         short=_row(target).note,
         clearance=_clearance(target),
