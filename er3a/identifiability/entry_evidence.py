@@ -82,6 +82,13 @@ class EntryEvidence:
         """Whether it is one of those that say where the tool is."""
         return column_of(self.entry) not in ("lower", "upper", "speed")
 
+    @property
+    def trust(self) -> Status:
+        """The status to act on. A direction that one document settles is to be seen on the arm first: a sign is right
+        or wrong as a whole, and one jog shows which."""
+        one_sign = column_of(self.entry) == "direction" and self.status in ("settled", "settled_up_to_signs")
+        return "consistent" if one_sign and len(self.by) < 2 else self.status
+
 
 @frozen
 class OtherTable(ByValue):

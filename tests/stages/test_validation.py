@@ -42,7 +42,7 @@ from er3a.pipeline.stages.validation.model import (
     ValidationSummary,
 )
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
-from er3a.pipeline.stages.validation.page.report import report
+from er3a.pipeline.stages.validation.page.report import jog_seen, report
 from er3a.pipeline.study import RobotEntry, Study, load_study
 from er3a.references.predict import predict, state_of
 from er3a.references.quantities import AxisAngle, AxisDistance, Limit, Speed
@@ -698,3 +698,13 @@ def test_the_readme_tells_which_table_can_be_trusted_as_validation_does(summarie
     moving = [each for each in summaries["er3a_c60"].evidence.entries if each.moves_tool and each.status == "open"]
     assert {each.entry for each in moving} == {"alpha6", "offset6"}
     assert "nothing contradicts it, alpha 6 and offset 6 stay open" in told
+
+
+@pytest.mark.parametrize("toward", ["up", "down"])
+def test_a_mark_on_the_flange_is_drawn_where_an_upright_axis_turns_it(toward):
+    robot = load_robot(ROBOTS / "er3a_c60.yaml")
+    found = fact("look_at_motion", entry="direction1", joint=1, point="flange", pose_deg=(0.0,) * 6)
+    drawn = jog_seen(robot, found.but(seen=f"clockwise_looking_{toward}"))
+    ways = re.findall(r'class="turn \w+" data-entry=""><polyline points="(\S+) .*?(\S+)"', drawn)
+    assert len(ways) == 2
+    assert all(first != last for first, last in ways)

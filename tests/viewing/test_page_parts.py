@@ -14,7 +14,7 @@ from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.overview.search import TextOfPage
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.validation.page.evidence_section import LOOKS, rounded_within, status_of
+from er3a.pipeline.stages.validation.page.evidence_section import LOOKS, rounded_within
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.page import Head, Numbering
 from tests.conftest import ROOT
@@ -57,7 +57,7 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
     for entry in stated:
         link = re.escape(f'href="{name}/validation.html#cell-{entry.entry}"')
         look, shown = re.search(rf'<td class="(\w+)" title="[^"]*"><a {link}[^>]*>(.*?)</a></td>', page).groups()
-        assert look == LOOKS[status_of(entry)], entry
+        assert look == LOOKS[entry.trust], entry
         if look != "wrong":
             assert "→" not in shown
             continue

@@ -189,8 +189,8 @@ def _several(parts: tuple[Any, ...] | list[Any], spec: str) -> str:
     most, each, separator = found.groups()
     shown = [_as_text(part, each) for part in parts[: int(most) if most else None]]
     more = len(parts) - len(shown)
-    if shown and isinstance(parts[0], float):
-        return separator.join(shown)  # coordinates
+    if each.endswith(("f", "g")):  # coordinates
+        return separator.join(shown)
     return joined([*shown, sentence("more", count=more) if more else ""], separator or "; ")
 
 

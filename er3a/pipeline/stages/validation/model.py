@@ -266,8 +266,8 @@ class TableEvidence:
 
     @property
     def unconfirmed(self) -> list[str]:
-        """The entries of the table that no independent document settles or excludes."""
-        return [each.entry for each in self.entries if each.status in ("open", "weak", "consistent")]
+        """The entries of the table to confirm before they are used."""
+        return [each.entry for each in self.entries if each.trust in ("open", "weak", "consistent")]
 
 
 class ValidationSummary(Summary):

@@ -88,8 +88,8 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     listed = [*left, *(each for each in numbers if each.status in SETTLED)]
     proposals = {proposal.entry: to_settle(proposal) for proposal in evidence.proposals}
     todo = {each.entry: proposals[each.entry] for each in evidence.proposals if not is_one(each, "look_at_motion")}
-    counts = Counter(LOOKS[status_of(each)] for each in evidence.entries if each.value is not None)
-    present = {status_of(each) for each in numbers}
+    counts = Counter(LOOKS[each.trust] for each in evidence.entries if each.value is not None)
+    present = {each.trust for each in numbers}
     first = [ListRow("fail", entry_word(each.entry), _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
@@ -228,14 +228,14 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, proposals: Mappin
     """An entry in the table; None where there is none."""
     if each is None or each.value is None:
         return None
-    look = LOOKS[status_of(each)]
+    look = LOOKS[each.trust]
     return dict(
         entry=each.entry,
         value=_plain(each.value),
-        status=status_of(each),
+        status=each.trust,
         look=look,
         mark=MARKS[look],
-        title=tr("{entry}: {status}", entry=entry_word(each.entry), status=_status(status_of(each))),
+        title=tr("{entry}: {status}", entry=entry_word(each.entry), status=_status(each.trust)),
         gives=_other_given(each, evidence),
         said=_said(each, evidence, proposals),
         unsure=len(each.by) == 1,
@@ -244,7 +244,7 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, proposals: Mappin
 
 def _said(each: EntryEvidence, evidence: TableEvidence, proposals: Mapping[str, str]) -> str:
     """What is known of an entry, and what to do, in short sentences."""
-    other, status = _other_given(each, evidence), status_of(each)
+    other, status = _other_given(each, evidence), each.trust
     first = word("status_meaning", STATUS_MEANINGS, status)
     if other:
         known = N_("it is {value}") if each.by[1:] else N_("by one document it is {value}: confirm it")
@@ -252,14 +252,6 @@ def _said(each: EntryEvidence, evidence: TableEvidence, proposals: Mapping[str, 
         first = tr(text, value=with_unit(other, each.unit))
     said = map(whole_sentence, filter(None, (first, proposals.get(each.entry, ""))))
     return joined([entry_word(each.entry), joined(said, " ")], ": ")
-
-
-def status_of(each: EntryEvidence) -> Status:
-    """What is known of an entry; a direction is a sign, and so settled as a whole, but not by one document: the table
-    that was made from this document asks to confirm it."""
-    if column_of(each.entry) != "direction" or LOOKS[each.status] != "sound":
-        return each.status
-    return "settled" if each.by[1:] else "consistent"
 
 
 def _status(status: Status) -> str:
@@ -274,7 +266,7 @@ def _row(each: EntryEvidence, evidence: TableEvidence) -> list[str]:
     return [
         entry_word(each.entry),
         with_unit(_plain(each.value or 0.0), each.unit),
-        _status(status_of(each)),
+        _status(each.trust),
         _interval(each, evidence),
         joined(each.by, ", ") or "–",
     ]

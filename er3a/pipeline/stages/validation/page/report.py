@@ -212,18 +212,27 @@ def _both_arms(
             over.append(DrawnLine(right[entry], "mark right", entry, gives or cell["value"]))
     labels += off
     drawn = side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=beyond(arms), over=over)
-    return drawn + Markup("").join(_look(robot, each) for each in evidence.get("looks", ()))
+    return drawn + Markup("").join(jog_seen(robot, each) for each in evidence.get("looks", ()))
 
 
-def _look(robot: Robot, found: Finding) -> Markup:
+def jog_seen(robot: Robot, found: Finding) -> Markup:
     """Where the arm goes when a joint is jogged, and where it would if its direction were the other, seen from where
-    the flange is farthest off; where the flange turns in its place, where a mark on it goes."""
+    the flange is farthest off; where the flange turns in its place, where a mark on it goes.
+
+    Parameters
+    ----------
+    found : a proposal to look at a motion: joint, pose in deg, and how it is seen to move
+
+    Returns
+    -------
+    drawing : in HTML
+    """
     q, jog = meant(robot, found.pose_deg), np.eye(robot.joints)[found.joint - 1]
     ways = np.array([[1000 * skeleton(robot, q + turn * jog) for turn in way] for way in (JOG, -JOG)])
     manner, _, toward = found.seen.rpartition("_")
     if manner:
         flanges = np.array([[frames(robot, q + turn * jog)[-1, :3, :3] for turn in way] for way in (JOG, -JOG)])
-        across = UP[1] if manner == "clockwise" and toward in ("up", "down") else UP[0]
+        across = UP[1] if manner.startswith("clockwise") and toward in ("up", "down") else UP[0]
         mark = flanges[0, 0, :, 2] if manner == "tilts" else np.array(across)
         tips = flanges @ flanges[0, 0].T @ mark
         ways = np.stack([np.zeros_like(tips), MARK_MM * tips], axis=2)
