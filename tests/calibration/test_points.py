@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 import er3a
 from er3a.calibration.clustered import clustered_covariance
 from er3a.calibration.fit import Fit
+from er3a.calibration.held_back import held_back_findings
 from er3a.calibration.observations import Measurement, PointObservations, spread
 from er3a.calibration.parameters import CalibrationError, coupled, settles
 from er3a.calibration.terms import JointErrors, JointTerm, candidates, starting_table
@@ -28,12 +29,7 @@ from er3a.finding import fact
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.kinematics.chain import row_values
 from er3a.pipeline.cli import app
-from er3a.pipeline.messages.calibration import (
-    calibration_record,
-    held_back_warning,
-    idle_texts,
-    lines_of,
-)
+from er3a.pipeline.messages.calibration import calibration_record, idle_texts, lines_of
 from er3a.pipeline.messages.say import say
 from er3a.robots.joint_limits import shown
 from testing.plain_calibration import MeasuredArm, distances, measured_arm, plain_fit, positions
@@ -397,18 +393,20 @@ def test_held_back_positions_that_contradict_the_fit_are_told_first(random):
     found = er3a.calibrate(bench.robot, rows)
     inside = [each for each in bench.measured(20, 0.05) if np.abs(each.pose).max() < 100]
     beside = [replace(each, xyz_mm=tuple(np.add(each.xyz_mm, (3, 0, 0)))) for each in inside]
-    assert not held_back_warning(found, rows, inside)
-    (warning,) = held_back_warning(found, rows, beside)
-    assert lines_of(found, rows, beside).startswith(f"{len(inside)} positions held back contradict the calibration")
-    assert warning == calibration_record(found, bench.robot, rows, beside)["held_back_warning"]
-    (warning,) = held_back_warning(found, rows, rows[:5])
-    assert warning.startswith("All positions held back are at fitted poses")
-    told = held_back_warning(found, rows, [*rows[:5], *beside])
-    assert told[0].startswith("5 positions held back are at fitted poses")
-    assert told[1].startswith(f"{len(inside)} positions held back contradict the calibration")
+
+    def codes(fitted, others):
+        return [each.code for each in held_back_findings(found, fitted, others)]
+
+    assert codes(rows, inside) == []
+    (against,) = held_back_findings(found, rows, beside)
+    assert (against.code, against.count) == ("held_back_contradict", len(inside))
+    assert against.mean_mm == pytest.approx(3.0, abs=0.2)
+    assert lines_of(found, rows, beside).startswith(say(against))
+    assert calibration_record(found, bench.robot, rows, beside)["held_back_warning"] == say(against)
+    assert codes(rows, rows[:5]) == ["held_back_all_fitted"]
+    assert codes(rows, [*rows[:5], *beside]) == ["held_back_fitted", "held_back_contradict"]
     near = [each for each in rows if each.pose[0] < 0]
-    (warning,) = held_back_warning(found, near, [each for each in beside if each.pose[0] > 0])
-    assert "beyond the fitted joint values" in warning
+    assert codes(near, [each for each in beside if each.pose[0] > 0]) == ["held_back_elsewhere"]
 
 
 @pytest.mark.long

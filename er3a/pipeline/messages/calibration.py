@@ -6,16 +6,15 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 import er3a.pipeline.messages.diagnosis  # noqa: F401
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
 from er3a.calibration.cross_validation import TriedTerm
+from er3a.calibration.held_back import AGAINST, held_back_findings
 from er3a.calibration.observations import Measurement
 from er3a.calibration.terms import starting_table
-from er3a.finding import plain
-from er3a.pipeline.language import N_, as_text, tr, words
-from er3a.pipeline.messages.say import say
+from er3a.finding import is_one, plain
+from er3a.pipeline.language import as_text, tr, words
+from er3a.pipeline.messages.say import joined, listed, say, texts
 from er3a.robots.robot import Robot
 
 RECORDED = (
@@ -24,8 +23,6 @@ RECORDED = (
 )
 OF_AN_ENTRY = ("name", "nominal", "correction", "half_width", "unit")
 MUCH_SCATTER, LITTLE_SCATTER = 2.0, 0.3
-CONTRADICTING = 3.0
-"""Times the error at poses left out: positions held back that are farther off are not where the model puts them."""
 TERMS = words(
     {
         "ratio": "ratio",
@@ -37,20 +34,28 @@ TERMS = words(
     }
 )
 KINDS = words({"place": "place", "plane": "plane"})
-CONTRADICTED = N_(
-    "{count} positions held back contradict the calibration: {mean} mm off on average, poses left out {usual} mm. "
-    "Check that both files have the same frame, tool point and units."
-)
-ELSEWHERE = N_(
-    "{count} positions beyond the fitted joint values are {mean} mm off on average, poses left out {usual} mm. Measure "
-    "there, too."
-)
 VERDICTS = words(
     {
         "taken": "taken",
         "not_lower": "left: poses left out are not met better",
         "noise": "left: noise may have made it",
         "wrong_way": "left: a load would have to lift the arm",
+    }
+)
+TEXTS = texts(
+    {
+        "held_back_all_fitted": "All positions held back are at fitted poses and test nothing. Hold others back.",
+        "held_back_fitted": (
+            "{count} positions held back are at fitted poses and test nothing. Take them out of one of the files."
+        ),
+        "held_back_contradict": (
+            "{count} positions held back contradict the calibration: {mean_mm:.3g} mm off on average, poses left out "
+            "{usual_mm:.3g} mm. Check that both files have the same frame, tool point and units."
+        ),
+        "held_back_elsewhere": (
+            "{count} positions beyond the fitted joint values are {mean_mm:.3g} mm off on average, poses left out "
+            "{usual_mm:.3g} mm. Measure there, too."
+        ),
     }
 )
 
@@ -66,7 +71,7 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
     not_settled = f"; not settled: {', '.join(found.open)}" if found.open else ""
     lines = [
         *([] if found.fits else [say(found.conclusion)]),
-        *held_back_warning(found, fitted, others),
+        *listed(held_back_findings(found, fitted, others)),
         *_summary(found),
         *warning_texts(found),
         f"{found.coordinates} coordinates at {found.poses} poses settle {settled} of {numbers} numbers{not_settled}",
@@ -163,45 +168,6 @@ def kept_lines(
     return lines
 
 
-def held_back_warning(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[str]:
-    """That positions held back were fitted, that others contradict the fit, or that it does not hold elsewhere."""
-    unseen = _unseen(fitted, others)
-    if (seen := len(others) - len(unseen)) and not unseen:
-        return [tr("All positions held back are at fitted poses and test nothing. Hold others back.")]
-    also = tr(
-        "{count} positions held back are at fitted poses and test nothing. Take them out of one of the files.",
-        count=seen,
-    )
-    return [*([also] if seen else []), *_held_back_contradicts(found, fitted, unseen)]
-
-
-def held_back_contradicts(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> bool:
-    """Whether positions held back are not where the model puts them."""
-    return bool(_held_back_contradicts(found, fitted, _unseen(fitted, others)))
-
-
-def _unseen(fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[Measurement]:
-    """Those that were not fitted too."""
-    fitted_too = {(each.pose, each.point) for each in fitted}
-    return [each for each in others if (each.pose, each.point) not in fitted_too]
-
-
-def _held_back_contradicts(
-    found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]
-) -> list[str]:
-    """That positions which the fit has not seen contradict it, or that it does not hold where no fitted pose is."""
-    expected = found.beyond.left_out if found.beyond else found.left_out
-    if not (expected and others):
-        return []
-    poses, seen = (np.array([each.pose for each in rows]) for rows in (others, fitted))
-    inside = ((poses >= seen.min(axis=0)) & (poses <= seen.max(axis=0))).all(axis=1)
-    distances, usual = found.distances_mm(others), max(expected.mean_mm, expected.far_mean_mm)
-    for where, text in ((inside, CONTRADICTED), (~inside, ELSEWHERE)):
-        if where.any() and (mean := float(distances[where].mean())) > CONTRADICTING * usual:
-            return [tr(text, count=int(where.sum()), mean=f"{mean:.3g}", usual=f"{usual:.3g}")]
-    return []
-
-
 def held_back_line(found: Calibration, others: Sequence[Measurement]) -> str:
     """How far the model is from positions that the fit has not seen, mm."""
     off = found.distances_mm(others)
@@ -258,6 +224,7 @@ def calibration_record(
     robot : that the calibration started from
     fitted, others : measured positions that it rests on, and those held back
     """
+    findings = held_back_findings(found, fitted, others)
     return {
         "start": starting_table(robot),
         **{name: plain(getattr(found, name)) for name in RECORDED},
@@ -269,8 +236,8 @@ def calibration_record(
         "set_aside": plain(found.outliers),
         "beyond": _beyond(found.beyond) if found.beyond else None,
         "held_back": _held_back(found, others) if others else None,
-        "held_back_warning": " ".join(held_back_warning(found, fitted, others)) or None,
-        "held_back_contradicts": held_back_contradicts(found, fitted, others),
+        "held_back_warning": joined(listed(findings), " ") or None,
+        "held_back_contradicts": any(is_one(each, *AGAINST) for each in findings),
         "not_examined": not_examined_texts(found, others) if fitted else [],
     }
 

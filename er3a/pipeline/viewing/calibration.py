@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from er3a.by_value import by_identity
 from er3a.calibration.calibrate import Calibration, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
+from er3a.calibration.held_back import held_back_findings
 from er3a.calibration.observations import Measurement, PointObservations, observed
 from er3a.files.kept_files import sha256
 from er3a.files.robot_writer import robot_file, robot_text
@@ -23,14 +24,13 @@ from er3a.pipeline.language import N_, as_text, tr, unit_sign
 from er3a.pipeline.messages.calibration import (
     VERDICTS,
     file_text,
-    held_back_warning,
     idle_texts,
     not_examined_texts,
     term_kind,
     warning_texts,
 )
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.messages.say import bracketed, joined, say
+from er3a.pipeline.messages.say import bracketed, joined, listed, say
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, house_style, new_figure
@@ -122,7 +122,7 @@ def write_calibration(
     """
     errors = measured_errors(robot, measurements, found)
     text = robot_text(robot_file(corrected))
-    beside = held_back_warning(found, measurements, held_back)
+    against = listed(held_back_findings(found, measurements, held_back))
     table = str(files[0]) if len(files) > 1 else robot.name
     with house_style():
         page.render(
@@ -131,8 +131,8 @@ def write_calibration(
             command=shlex.join(command),
             provenance=Provenance(tuple(Input(str(f), sha256(f), {}) for f in files), code_digest()),
             arm=language.own_title(robot.title),
-            verdict="fail" if not found.fits else "caution" if beside else "pass",
-            conclusion=joined([say(found.conclusion), *beside], " "),
+            verdict="fail" if not found.fits else "caution" if against else "pass",
+            conclusion=joined([say(found.conclusion), *against], " "),
             texts=_texts(found, held_back),
             figures=_figures(found, errors),
             errors=_errors(found, errors, held_back),
