@@ -40,6 +40,7 @@ MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, an
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
 FARTHEST = 1.15  # of the arm's size, from its base: what is farther need not be in the picture
 MARGIN = 0.12  # of the arm's size, around what is to be seen: links are thick
+AROUND = 0.1  # of the arm's size, from its way: what bodies have farther off need not be in the picture
 TURNED = 0.25  # rad, by which the eye looks at arms along y from another side
 TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which the arm is seen best
 HIDDEN_COSTS, TURN_COSTS = 1.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
@@ -180,12 +181,13 @@ def _corners(shape: Shape) -> Reals:
 def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, turned: float) -> dict[str, Any]:
     """How much has to be seen (m), and around which point, for the picture to hold the arms on their ways and what is
     around them, as far as that is near; ``turned``, rad: of the eye."""
-    bodies = [each for each in data["scene"] if not each.get("large") and each.get("pale") is not True]
-    points = [_corners(shape) for shape in bodies]
+    points = [poses_at(robots[0], q)[:, :3, 3] for q in motion.ghosts]
     for robot, q in zip(robots, (motion.q, *motion.beside)):
         points += [poses_at(robot, q[k])[:, :3, 3] for k in np.linspace(0, len(q) - 1, FRAMED).astype(int)]
-    points += [poses_at(robots[0], q)[:, :3, 3] for q in motion.ghosts]
     points += [np.array([mark.start]) for mark in motion.marks]
+    arms, around = np.concatenate(points), AROUND * data["size"]
+    bodies = [each for each in data["scene"] if not each.get("large") and each.get("pale") is not True]
+    points += [_corners(each).clip(arms.min(axis=0) - around, arms.max(axis=0) + around) for each in bodies]
     middle, far = robots[0].base[:3, 3], FARTHEST * data["size"] + np.ptp([each.base[:3, 3] for each in robots], axis=0)
     seen = np.clip(np.concatenate(points), middle - far, middle + far)
     axes = axes_of(AZIMUTH + turned, motion.elevation)

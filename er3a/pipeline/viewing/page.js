@@ -624,6 +624,7 @@ const rows = [...document.querySelectorAll(".runs:not(.plain) a[href]")];
 const fix = rows.some((row) => row.dataset.fix) && document.querySelector(".hero .fix"); // it follows the row
 const mark = (shown, part = shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
+  shown?.closest("details")?.setAttribute("open", "");
   if (!fix || fix.toggleAttribute("hidden", !part?.dataset.fix)) return;
   const { lead, fix: advice, instead } = part.dataset;
   fix.querySelector("b").textContent = lead;
