@@ -13,7 +13,7 @@ from er3a.collision.pairs import names_of
 from er3a.collision.scene import Scene
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, tr, with_unit
+from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
@@ -34,7 +34,7 @@ from er3a.pipeline.messages.trajectory import (
     repair_text,
     switch_text,
 )
-from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of, gap
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import RATES, by_kind, rate_ratio
@@ -79,7 +79,9 @@ def motions(
         seen += safe_end(path, results.clearance)
         marks, q = [*contact(path), *_beyond(path, whole)], meant(robot, rows.q_deg)
         if near and path.clearance and scene:
-            marks.append(_gap(Bodies(robot, scene), path.clearance, rows.t_s, q))
+            least = path.clearance
+            then = np.array([np.interp(least.t_s, rows.t_s, own) for own in q.T])
+            marks.append(gap(Bodies(robot, scene), then, least.least_mm, least.t_s - MOMENT, least.t_s + MOMENT))
         motions.append(PlayedMotion(path.name, text, rows.t_s, q, seen, marks, whole_s=path.duration_s))
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
@@ -88,14 +90,6 @@ def motions(
             seen = [*added(repaired(path)), *_nearest(path.chosen.motion.clearance if path.chosen.motion else None)]
             motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, seen))
     return motions
-
-
-def _gap(bodies: Bodies, least: model.MinClearance, t: Reals, q: Reals) -> Mark:
-    """Where a motion, joint values ``q`` (N, n) at times ``t`` (N,), is nearest to anything, as a line there."""
-    then = np.array([[np.interp(least.t_s, t, own) for own in q.T]])
-    start, end = bodies.surface_points(then[0], int(bodies.min_distance(then)[1][0])).tolist()
-    far = with_unit(fixed(least.least_mm, 1), "mm")
-    return Mark(least.t_s - MOMENT, least.t_s + MOMENT, start, end, far)
 
 
 def _nearest(least: model.MinClearance | None) -> list[PlayedEvent]:

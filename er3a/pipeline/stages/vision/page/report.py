@@ -49,7 +49,7 @@ CUT = 0.9  # of the height of a figure, where bars end that are longer than it
 def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> Picture:
     """Length of each sample's residual of position; one that was left out is cut off, and named."""
     size, mean, order = np.linalg.norm(rows.residual_mm, axis=1), 1.6 * found.camera_mm, np.arange(1, len(rows) + 1)
-    figure, ax = new_figure(width=SIDE, height=1.9)
+    figure, ax = new_figure(width=SIDE, height=2.2)
     ax.bar(order[rows.used], size[rows.used], color=MODEL, label=tr("used"))
     ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("expected mean"))
     top = 1.3 * max(mean, size[rows.used].max(initial=0.0))
