@@ -188,11 +188,10 @@ function tellLoads(poses) {
   const most = Math.max(...motion.loads.flat().map(Math.abs).filter(Number.isFinite)) || 1;
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
   const loads = valuesAt(motion.times, motion.loads, t);
-  const alone = loads.filter(Number.isFinite).length === 1; // its bar would be full
   loads.forEach((load, j) => {
     if (Number.isNaN(load)) return;
     const felt = Math.abs(load) > 0.01 * most; // what is not is told in grey, without a bar
-    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt && !alone ? Math.abs(load) / most : null);
+    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt ? Math.abs(load) / most : null);
   });
 }
 
