@@ -67,7 +67,8 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlabel(tr("sample"))
     ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
-    caption = tr("Residual of each sample.")
+    ax.set_xlim(0.4, len(rows) + 0.6)
+    caption = tr("Calibration: residual of each sample.")
     return Picture(figure, caption, caption)
 
 
@@ -196,7 +197,8 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     least = _least_sure(objects)
     if least and least.grasp and least.error_mm:
         made = joined([tr("in 95 % of grasps"), tr("simulated") if found and found.simulated else ""], ", ")
-        allowed = tr("within {limit:g} mm, {turn:g}°: {name}", limit=limit, turn=turn, name=least.name)
+        asked = {"least": 100 * summary.least_success, "limit": limit, "turn": turn}
+        allowed = tr("{name}: {least:g} % needed within {limit:g} mm, {turn:g}°", name=least.name, **asked)
         keys = [
             (f"{fixed(100 * least.grasp.probability, 1)} %", allowed),
             (tr("{far} off", far=with_unit(fixed(least.error_mm.together, 1), "mm")), made),
