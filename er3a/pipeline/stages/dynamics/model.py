@@ -102,8 +102,8 @@ class MassesUsed:
 
 @frozen
 class HoldingTorque:
-    """The maximum torque found that a joint holds at rest within the limits, the pose where it does, and what all joints
-    hold there."""
+    """The maximum torque found that a joint holds at rest within the limits, the pose where it does, and what all
+    joints hold there."""
 
     joint: int
     torque: float

@@ -27,19 +27,19 @@ Position = tuple[float, float, float]
 MAX_GHOSTS = 8  # solutions that are drawn at a time: more hide each other
 
 
-def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows, bodies: Bodies) -> PlayedMotion:
+def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows, bodies: Bodies | None) -> PlayedMotion:
     """The arm in each branch that solves a target, among all of them, pale; without one where it comes nearest.
 
     Parameters
     ----------
     rows : the best row of each branch, in the order in which they are shown
-    bodies : of the arm and its scene, to which the gap of the chosen one is drawn
+    bodies : of the arm and its scene, to which the gap of the chosen one is drawn; None where it is not
     """
     q = meant(robot, rows.q_deg if len(rows) else np.array([target.q_ref_deg]))
     events = [_solution_event(rows, k) for k in range(len(rows))]
     events = events or [PlayedEvent(0.0, SHOWN_S, outcome_word(target.outcome), "fail")]
     marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
-    if target.clearance and len(rows):
+    if bodies and target.clearance and len(rows):
         marks.append(gap(bodies, q[0], target.clearance.least_mm, 0.0, SHOWN_S))
     near = target.neighbours if not len(rows) else None
     if near and near.shifted_to_mm and near.least_shift_mm:

@@ -51,7 +51,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         return results.solutions.take(names == target.name)
 
     scene = study.scene(name, stored.stage)
-    bodies = Bodies(robot, scene)
+    bodies = None if stored.withheld else Bodies(robot, scene)
     played = [solutions_played(robot, target, best_of_branches(of_target(target)), bodies) for target in chosen]
     answer, shown = both_arms(study, stored, played) or (
         _answer(results.targets, chosen),

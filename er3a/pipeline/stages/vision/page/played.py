@@ -75,7 +75,7 @@ def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Real
         return at_rest(robot, each.name, refusal_text(each), "fail", q, bodies, marks=[mark])
     parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
     events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
-    text = tr("At the grasp")
+    text = tr("Can be grasped here")
     if each.error_mm:
         off = fixed(each.error_mm.together, 1)
         text = tr("At the grasp: {off} mm off at most, {allowed:g} mm allowed", off=off, allowed=allowed_mm)
