@@ -95,8 +95,8 @@ def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> lis
     level = Mark(0.0, 1.0, tuple(top), tuple(top + lever), far)
     own = []
     for mass, way in zip(kg, off):
-        ends = at + way, at + way - [0, 0, DROP_M * mass / kg.sum()]
-        own.append(Mark(0.0, 1.0, *map(tuple, ends), with_unit(number(mass, 3), "kg")))
+        start, down = at + way, [0, 0, DROP_M * mass / kg.sum()]
+        own.append(Mark(0.0, 1.0, tuple(start), tuple(start - down), with_unit(number(mass, 3), "kg")))
     return [level, Mark(0.0, 1.0, tuple(centre), tuple(tip), heavy), *sides, *head, *own]
 
 

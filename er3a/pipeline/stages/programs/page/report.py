@@ -154,9 +154,9 @@ def _ended(robot: Robot, line: str, motion: model.ProgramMotion, here: list[mode
     ends = [each.finding.end_mm for each in here if "end_mm" in each.finding.params]
     if not ends or not len(motion) or not PLACE.match(line):
         return ""
-    turns = forward(robot, meant(robot, motion.q_deg[[0, -1]]))[:, :3, :3]
+    first, last = forward(robot, meant(robot, motion.q_deg[[0, -1]]))[:, :3, :3]
     places = (f"\\g<{k}>{value:.1f}" for k, value in enumerate(ends[0], 1))
-    return PLACE.sub("".join(places), line) if np.allclose(*turns, atol=LEVEL) else ""
+    return PLACE.sub("".join(places), line) if np.allclose(first, last, atol=LEVEL) else ""
 
 
 def _listing(
