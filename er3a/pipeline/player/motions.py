@@ -10,10 +10,8 @@ from urllib.parse import urlencode
 import numpy as np
 
 from er3a.by_value import by_identity, frozen
-from er3a.collision.bodies import Bodies
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import first_sentence, with_unit
-from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.language import first_sentence
 from er3a.pipeline.viewing.answer import Fix, ListRow, Part
 from er3a.pipeline.viewing.still import ELEVATION
 from er3a.robots.robot import Robot
@@ -139,18 +137,6 @@ def at_rest(
     pose = next(each for each in (q, robot.home, np.zeros(robot.joints)) if each is not None)
     events = [PlayedEvent(0.0, 1.0, text, weight, bodies)] if text else []
     return PlayedMotion(name, "", np.array([0.0, 1.0]), np.tile(pose, (2, 1)), events, **more)
-
-
-def gap(bodies: Bodies, q: Reals, far_mm: float, t0: float, t1: float) -> Mark:
-    """Where the arm is nearest to anything, as a line from ``t0`` to ``t1`` (s) with that distance.
-
-    Parameters
-    ----------
-    q : (n,), rad or m
-    far_mm : how near, as the results say it
-    """
-    start, end = bodies.surface_points(q, int(bodies.min_distance(q[None])[1][0])).tolist()
-    return Mark(t0, t1, start, end, with_unit(fixed(far_mm, 1), "mm"))
 
 
 def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:

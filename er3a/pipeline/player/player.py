@@ -38,7 +38,6 @@ _HERE = Path(__file__).parent
 TEACH, VIEWING = _HERE.with_name("teach"), _HERE.with_name("viewing")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
-FARTHEST = 1.15  # of the arm's size, from its base: what is farther need not be in the picture
 MARGIN = 0.12  # of the arm's size, around what is to be seen: links are thick
 AROUND = 0.1  # of the arm's size, from its way: what bodies have farther off need not be in the picture
 TURNED = 0.25  # rad, by which the eye looks at arms along y from another side
@@ -184,14 +183,13 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, 
     points = [poses_at(robots[0], q)[:, :3, 3] for q in motion.ghosts]
     for robot, q in zip(robots, (motion.q, *motion.beside)):
         points += [poses_at(robot, q[k])[:, :3, 3] for k in np.linspace(0, len(q) - 1, FRAMED).astype(int)]
-    points += [np.array([mark.start]) for mark in motion.marks]
-    arms, around = np.concatenate(points), AROUND * data["size"]
+    arms, size = np.concatenate(points), data["size"]
+    low, high = arms.min(axis=0), arms.max(axis=0)
     bodies = [each for each in data["scene"] if not each.get("large") and each.get("pale") is not True]
-    points += [_corners(each).clip(arms.min(axis=0) - around, arms.max(axis=0) + around) for each in bodies]
-    middle, far = robots[0].base[:3, 3], FARTHEST * data["size"] + np.ptp([each.base[:3, 3] for each in robots], axis=0)
-    seen = np.clip(np.concatenate(points), middle - far, middle + far)
+    points += [_corners(each).clip(low - AROUND * size, high + AROUND * size) for each in bodies]
+    points += [np.clip([mark.start], low - size, high + size) for mark in motion.marks]
     axes = axes_of(AZIMUTH + turned, motion.elevation)
-    across = seen @ axes.T
+    across = np.concatenate(points) @ axes.T
     middle = (across.min(axis=0) + across.max(axis=0)) / 2
     across -= middle
     length = data["size"]

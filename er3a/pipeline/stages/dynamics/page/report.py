@@ -29,10 +29,10 @@ DRAWN = 161
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
-    """Torques of all joints with their intervals, and what most of the greatest comes from."""
+    """Torques of all joints with their intervals."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
     figure, torque = new_figure(width=SIDE, height=4.6)
-    load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
+    unit = model.shared_unit(load.unit for load in path.joints)
     for j in range(rows.torque.shape[1]):
         colour = JOINTS[j % len(JOINTS)]
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
@@ -40,15 +40,8 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
     torque.legend(ncols=6, handlelength=0.8, loc="lower left", bbox_to_anchor=(0, 1))
     torque.set_ylabel(axis_label(rows, "torque", unit))
-    names = dict(
-        zip(
-            model.PARTS,
-            (tr("gravity"), tr("inertia"), tr("Coriolis, centrifugal"), tr("friction"), tr("forces at the tool")),
-        )
-    )
     torque.set_xlabel(axis_label(rows, "t_s"))
-    most = max(model.PARTS, key=lambda part: getattr(load, part))
-    caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
+    caption = tr("Shaded: tolerance of the masses.")
     return Picture(figure, caption, caption, [(torque, path.name)])
 
 

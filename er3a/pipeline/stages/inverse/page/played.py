@@ -16,8 +16,9 @@ from er3a.pipeline.messages.inverse import limits_in_short
 from er3a.pipeline.messages.kinematics import branch_word, singularity_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say
-from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight, gap
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
 from er3a.pipeline.stages.inverse.model import SolutionRows, TargetResult
+from er3a.pipeline.stages.trajectory.page.played import gap
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 from er3a.selection.regular_first import SINGULAR_PARTS

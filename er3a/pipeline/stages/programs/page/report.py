@@ -11,7 +11,6 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from er3a.finding import is_one
-from er3a.kinematics.forward import forward
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.numbers import fixed
@@ -37,21 +36,19 @@ from er3a.pipeline.viewing.answer import Answer, ListRow, judged, may_run
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
-from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 SHORTEST_S = 0.005  # of a cycle: what is shorter was not followed
 MAX_LINES = 400  # of a listing that the page shows
 AROUND = 3  # lines around those with motions or findings, in a longer listing
 PLACE = re.compile(r"(\s*LIN *{ *X *)[-+.\d]+( *, *Y *)[-+.\d]+( *, *Z *)[-+.\d]+")  # of a line of KRL to a pose
-LEVEL = 1e-3  # of a rotation's entries, up to which the tool does not turn
 
 
 def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) -> None:
     """Write the page of a robot's programs."""
     robot, results = study.robot(stored.robot), stored.results
     scene = study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
-    sections = [_section(robot, results, program) for program in worst_first(results)]
+    sections = [_section(results, program) for program in worst_first(results)]
     wrong, played = faults(results), motions(robot, results)
     render_stage(
         study,
@@ -108,7 +105,7 @@ def _cost(time_s: float, clear_mm: float | None) -> str:
     return " · ".join(parts)
 
 
-def _section(robot: Robot, results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:
+def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:
     own = Path(program.file).name
     found: dict[int, list[model.FindingAt]] = defaultdict(list)
     elsewhere = []
@@ -128,7 +125,7 @@ def _section(robot: Robot, results: model.ProgramsResults, program: model.Progra
         expected=as_expected(program),
         language=LANGUAGES[program.language].title,
         cycle=cycle_text(program) if program.cycle.stopping_s >= SHORTEST_S else "–",
-        lines=_listing(robot, program, text, rows, motion, found),
+        lines=_listing(program, text, rows, motion, found),
         elsewhere=elsewhere,
     )
 
@@ -148,19 +145,16 @@ def _remark(name: str, each: model.FindingAt) -> Markup:
     return Markup("<b>{}</b>{}{}").format(at, tr(": "), text)
 
 
-def _ended(robot: Robot, line: str, motion: model.ProgramMotion, here: list[model.FindingAt]) -> str:
+def _ended(line: str, here: list[model.FindingAt]) -> str:
     """A line with the place at which it may end; empty where nothing says so, where the line does not give its place in
-    numbers, and where the tool turns on its way: then it would arrive there turned otherwise."""
-    ends = [each.finding.end_mm for each in here if "end_mm" in each.finding.params]
-    if not ends or not len(motion) or not PLACE.match(line):
-        return ""
-    first, last = forward(robot, meant(robot, motion.q_deg[[0, -1]]))[:, :3, :3]
-    places = (f"\\g<{k}>{value:.1f}" for k, value in enumerate(ends[0], 1))
-    return PLACE.sub("".join(places), line) if np.allclose(first, last, atol=LEVEL) else ""
+    numbers, and where the tool would arrive turned otherwise."""
+    for found in (each.finding for each in here if "end_mm" in each.finding.params):
+        if PLACE.match(line) and not found.turns:
+            return PLACE.sub("".join(f"\\g<{k}>{value:.1f}" for k, value in enumerate(found.end_mm, 1)), line)
+    return ""
 
 
 def _listing(
-    robot: Robot,
     program: model.ProgramSummary,
     text: model.Lines,
     rows: model.Instructions,
@@ -205,7 +199,7 @@ def _listing(
                 brief=here and re.split("[;；]", say(min(here, key=weight).finding))[0],
                 remarks=[_remark(name, each) for each in sorted(here, key=cause_first)],
                 remedies=remedies(here),
-                instead=_ended(robot, words, motion.take(motion.line == number), here),
+                instead=_ended(words, here),
                 facts=_facts(rows, moves[number]),
                 stretch=leads[0],
                 moment=leads[1],

@@ -13,7 +13,7 @@ from er3a.collision.pairs import names_of
 from er3a.collision.scene import Scene
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, tr
+from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.collision import hit_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import fixed
@@ -34,7 +34,7 @@ from er3a.pipeline.messages.trajectory import (
     repair_text,
     switch_text,
 )
-from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of, gap
+from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import RATES, by_kind, rate_ratio
@@ -90,6 +90,18 @@ def motions(
             seen = [*added(repaired(path)), *_nearest(path.chosen.motion.clearance if path.chosen.motion else None)]
             motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, seen))
     return motions
+
+
+def gap(bodies: Bodies, q: Reals, far_mm: float, t0: float, t1: float) -> Mark:
+    """Where the arm is nearest to anything, as a line from ``t0`` to ``t1`` (s) with that distance.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+    far_mm : how near, as the results say it
+    """
+    start, end = bodies.surface_points(q, int(bodies.min_distance(q[None])[1][0])).tolist()
+    return Mark(t0, t1, start, end, with_unit(fixed(far_mm, 1), "mm"))
 
 
 def _nearest(least: model.MinClearance | None) -> list[PlayedEvent]:
