@@ -38,9 +38,10 @@ def with_touches_of(found: Finding, others: Iterable[Finding]) -> Finding:
     Parameters
     ----------
     found : ``motion_collides``: ``touches`` in the order of first contact, each ``bodies_touch``: of ``pair``, from a
-        time (``t_s``) of the motion on, and a place of a line (``at_mm``); ``depth_mm`` at most; ``at_target``: whether
-        they overlap at the motion's end; ``certain``: as of ``collision.shapes.surely_touch``; ``assumed``: by
-        shapes of the arm that no document gives, and by none of what is carried
+        time (``t_s``) of the motion on, there where they touch first (``place_m``, world), and a place of a line
+        (``at_mm``); ``depth_mm`` at most; ``at_target``: whether they overlap at the motion's end; ``certain``: as of
+        ``collision.shapes.surely_touch``; ``assumed``: by shapes of the arm that no document gives, and by none of
+        what is carried
     others : findings of the same instruction
 
     Returns

@@ -427,6 +427,7 @@ class Obstacles:
                 at_mm=path.along_mm(at) if path.of_tool else None,
                 certain=surely_touch(self.robot, name, float(depths[:, k].max()) / 1000, self.assumed_margin),
                 at_target=bool(depths[-1, k] > 0 and shares[-1] > 1 - 1e-9),
+                place_m=tuple(self.bodies.surface_points(path.at(np.array(at)), k).mean(axis=0).tolist()),
             )
             touches.append(touch)
         if not touches:

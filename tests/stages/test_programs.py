@@ -145,6 +145,10 @@ def test_a_line_that_ends_where_advised_keeps_its_margin(study, stored, tmp_path
     end = hit.program_s - hit.motion_s + hit.finding.end_s
     assert fault.instead[1].endswith(f"until={round(end, 9)}#{program.name}")
     assert f"({x:.1f}, {y:.1f}, {z:.1f}) mm" in fault.to_do
+    (played,) = (each for each in motions(study.robot("er3a_c60"), results) if each.name == program.name)
+    (touch,) = (mark for mark in played.marks if mark.text == "first contact")
+    assert (touch.t0, 1000 * touch.start[2]) == pytest.approx((hit.program_s, 100.0), abs=0.5)  # the table's top
+    assert 1000 * np.array(touch.start[:2]) == pytest.approx([x, y], abs=60)  # below the wrist
 
 
 @pytest.mark.long
@@ -162,6 +166,10 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     found = next(each for each in program.findings if each.finding.code == "above_limit")
     said = f"{found.program_s:.2f} s"
     assert f'data-play="outside_limits" data-t="{found.program_s}">{said}' in html
+    every = [each for program in stored["er3a_c60"].results.summary.programs for each in program.findings]
+    (x, y, z), *_ = (each.finding.end_mm for each in every if "end_mm" in each.finding.params)
+    assert f"<code>LIN {{X {x:.1f}, Y {y:.1f}, Z {z:.1f}, A 0.00, B 0.00, C 180.00}}</code>" in html
+    assert html.count("<pre><code>") == 1  # no other line may be mended by its place alone
     listed = faults(stored["er3a_c60"].results)
     assert {each.name for each in listed if each.meant} == {
         each.name for each in stored["er3a_c60"].results.summary.verdict.finding.demonstrations

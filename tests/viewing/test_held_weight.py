@@ -23,7 +23,7 @@ def drawn(joint, links=LINKS, **load):
     """The marks of a joint that holds the links in the pose Q_DEG."""
     summary = SimpleNamespace(
         masses=SimpleNamespace(**({"links": links, "load_kg": None} | load)),
-        holding=[HoldingTorque(joint, 1.0, 0.1, "N m", Q_DEG)],
+        holding=[HoldingTorque(joint, 1.0, 0.1, "N m", Q_DEG, (1.0,) * 6)],
     )
     return held(ROBOT, SimpleNamespace(summary=summary))[0].marks
 
@@ -43,8 +43,11 @@ def moment_kg_m(joint):
 
 @pytest.mark.parametrize("joint", [2, 3])
 def test_weight_times_lever_is_the_moment_that_the_joint_holds(joint):
-    lever, weight, *_ = drawn(joint)
-    kg = sum(each.mass_kg for each in LINKS if each.link >= joint)
+    lever, weight, *others = drawn(joint)
+    hung = [each.mass_kg for each in LINKS if each.link >= joint]
+    kg = sum(hung)
+    own = np.average([mark.start for mark in others[-len(hung) :]], axis=0, weights=hung)
+    assert weight.start == pytest.approx(own, abs=1e-9)  # of the links' own weights
     far = np.linalg.norm(np.subtract(lever.end, lever.start))
     assert kg * far == pytest.approx(moment_kg_m(joint), rel=1e-6)
     assert lever.start[2] == pytest.approx(lever.end[2], abs=1e-12)

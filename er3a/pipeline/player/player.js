@@ -102,6 +102,7 @@ function frame(now) {
 const isNow = ({ t: from, until }) => t >= from - ROUNDED && t <= until + ROUNDED;
 
 function draw() {
+  if (bar.dataset.motion !== motion.name) newMotion();
   const now = motion.events.filter(isNow);
   const colours = new Map();
   for (const grave of [false, true]) {
@@ -115,9 +116,11 @@ function draw() {
   if (space.target !== motion.target) Object.assign(space, { target: motion.target, distance: (space.distance * motion.length) / space.length, length: motion.length });
   if (space.turned !== motion.turned) Object.assign(space, { azimuth: space.azimuth + motion.turned - (space.turned ?? 0), elevation: motion.elevation, turned: motion.turned });
   space.begin();
-  space.floor(column(table.base, 3), data.size / 10, floor, Boolean(unjudged));
+  const { offsetLeft, offsetTop, offsetWidth, offsetHeight } = nowShown; // words keep off what is said there
+  space.taken.push([offsetLeft + offsetWidth / 2, offsetTop + offsetHeight / 2, offsetWidth, offsetHeight]);
+  space.floor(column(table.base, 3), data.size / 10, floor);
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
-  arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value, k === 0 && Boolean(wrong)));
+  arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value));
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
   const others = wrong ? [] : motion.ghosts.map((q) => posesOf(arms[0], q));
   const shades = motion.events.map(({ status }) => data.colours[status] ?? page.muted);
@@ -129,7 +132,6 @@ function draw() {
   }
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && (touching.has(mesh.shape.name) ? SEEN_THROUGH : FAINT));
-  motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   const moves = motion.trails[0].some((point) => Math.hypot(...subtract(point, motion.trails[0][0])) >= CLOSED * data.size);
   for (const trail of moves ? motion.trails : []) space.line(trail, wrong ? (trail === motion.trails[0] ? page.touching : page.accent) : page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
@@ -188,11 +190,10 @@ function tellLoads(poses) {
   const most = Math.max(...motion.loads.flat().map(Math.abs).filter(Number.isFinite)) || 1;
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
   const loads = valuesAt(motion.times, motion.loads, t);
-  const alone = loads.filter(Number.isFinite).length === 1; // its bar would be full
   loads.forEach((load, j) => {
     if (Number.isNaN(load)) return;
     const felt = Math.abs(load) > 0.01 * most; // what is not is told in grey, without a bar
-    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt && !alone ? Math.abs(load) / most : null);
+    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt ? Math.abs(load) / most : null);
   });
 }
 
@@ -208,7 +209,6 @@ function nameEnds(trail) {
 
 /** Time bar, clock, events and the cursors of the plots. */
 function tell() {
-  if (bar.dataset.motion !== motion.name) newMotion();
   bar.value = String(t);
   const several = motion.ghosts.length > 1; // a second for each solution
   const [at, last, said] = several ? [String(Math.floor(t) + 1), String(Math.ceil(end())), words.solution] : [fixed(t), fixed(whole()), words.clock];
@@ -263,6 +263,7 @@ function show(element, text) {
 }
 
 function newMotion() {
+  motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   dispatchEvent(new CustomEvent("motion", { detail: motion.name }));
   bar.dataset.motion = chooser.value = motion.name;
   part("ticks").classList.toggle("solutions", motion.ghosts.length > 0);
@@ -278,6 +279,10 @@ function newMotion() {
     return tick;
   });
   part("ticks").replaceChildren(...ticks);
+  if (arms.length < 2) return; // or else the bar shows how far the tools are from each other, over time
+  const off = motion.trails[0].map((point, k) => Math.hypot(...subtract(point, motion.trails[1][k])));
+  const shades = off.map((far, k) => `color-mix(in srgb, var(--fail) ${(100 * far) / Math.max(...off)}%, var(--line)) ${(100 * motion.times[k]) / end()}%`);
+  part("ticks").style.background = `linear-gradient(to right, ${shades})`;
 }
 
 /** Lays a cursor over each panel of a plot; returns what moves them. */
@@ -385,6 +390,7 @@ if (!answer(asked)) {
   else goTo(...(named && row ? [row.dataset.play, Number(row.dataset.t)] : data.opened));
 }
 part("controls").hidden = part("joints").hidden = false;
+newMotion();
 tell();
 dispatchEvent(new Event("player")); // the page has its length now
 refresh();

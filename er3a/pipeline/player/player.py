@@ -38,8 +38,8 @@ _HERE = Path(__file__).parent
 TEACH, VIEWING = _HERE.with_name("teach"), _HERE.with_name("viewing")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
-FARTHEST = 1.15  # of the arm's size, from its base: what is farther need not be in the picture
 MARGIN = 0.12  # of the arm's size, around what is to be seen: links are thick
+AROUND = 0.1  # of the arm's size, from its way: what bodies have farther off need not be in the picture
 TURNED = 0.25  # rad, by which the eye looks at arms along y from another side
 TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which the arm is seen best
 HIDDEN_COSTS, TURN_COSTS = 1.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
@@ -180,16 +180,16 @@ def _corners(shape: Shape) -> Reals:
 def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, turned: float) -> dict[str, Any]:
     """How much has to be seen (m), and around which point, for the picture to hold the arms on their ways and what is
     around them, as far as that is near; ``turned``, rad: of the eye."""
-    bodies = [each for each in data["scene"] if not each.get("large") and each.get("pale") is not True]
-    points = [_corners(shape) for shape in bodies]
+    points = [poses_at(robots[0], q)[:, :3, 3] for q in motion.ghosts]
     for robot, q in zip(robots, (motion.q, *motion.beside)):
         points += [poses_at(robot, q[k])[:, :3, 3] for k in np.linspace(0, len(q) - 1, FRAMED).astype(int)]
-    points += [poses_at(robots[0], q)[:, :3, 3] for q in motion.ghosts]
-    points += [np.array([mark.start]) for mark in motion.marks]
-    middle, far = robots[0].base[:3, 3], FARTHEST * data["size"] + np.ptp([each.base[:3, 3] for each in robots], axis=0)
-    seen = np.clip(np.concatenate(points), middle - far, middle + far)
+    arms, size = np.concatenate(points), data["size"]
+    low, high = arms.min(axis=0), arms.max(axis=0)
+    bodies = [each for each in data["scene"] if not each.get("large") and each.get("pale") is not True]
+    points += [_corners(each).clip(low - AROUND * size, high + AROUND * size) for each in bodies]
+    points += [np.clip([mark.start], low - size, high + size) for mark in motion.marks]
     axes = axes_of(AZIMUTH + turned, motion.elevation)
-    across = seen @ axes.T
+    across = np.concatenate(points) @ axes.T
     middle = (across.min(axis=0) + across.max(axis=0)) / 2
     across -= middle
     length = data["size"]
@@ -254,6 +254,8 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
             picture.word(mark.text, np.array(mark.start), "fail" if colours else "ink")
         elif mark.t0 <= t <= mark.t1:
             picture.line(np.array([mark.start, mark.end]), INK, 1.5)
+    for sign, own in zip(data["signs"], poses):
+        picture.word(sign["text"], own[3, :3, 3], "ink")
     for shape in data["scene"]:
         if "pale" not in shape:
             picture.word(shape["name"], np.array(shape["T"])[:3, 3], "fail" if shape["name"] in colours else "ink")

@@ -1,7 +1,4 @@
-/**
- * A figure in space: layers of points and surfaces among solids, over a floor. A reader turns it, cuts it open, and leaves
- * layers out.
- */
+/** A figure in space: layers of points and surfaces among solids. A reader turns it, cuts it open, and leaves layers out. */
 
 import { add, column, dot, scaled, subtract } from "er3a/algebra";
 import { ARM, Space, alongArm, eyeOf, surface } from "er3a/space";

@@ -27,7 +27,7 @@ export class ArmView extends Space {
     const colours = new Map((data.wrong ? poses.map((_, j) => (j ? `link_${j}` : "base")) : [...touching]).map((name) => [name, data.colours.touching]));
     this.begin();
     this.floor(base, reach / 10, data.floor ?? base[2]);
-    this.arm.show(poses, colours, look, data.wrong);
+    this.arm.show(poses, colours, look);
     if (ghost) this.other.show(this.#poses(ghost), new Map(), look, true);
     else this.other.hide();
     const hiding = this.hiding(this.surroundings, poses);

@@ -12,6 +12,7 @@ Mark = Literal["pass", "caution", "fail", "conflict", "no_reference", "no_verdic
 PartMark = Literal["pass", "caution", "fail", "none", "rest", "zero", "spread"]
 """Of a stretch of a bar; ``rest`` is what the bar leaves empty, ``zero`` a line at its start."""
 NARROWEST = 0.04  # of a bar, at which a moment is still seen
+MOST_ROWS = 14  # of a list; in a longer one those that pass are folded
 
 
 @frozen
@@ -58,11 +59,12 @@ class ListRow:
 
 @frozen
 class Group:
-    """Rows under one title, with how many they are where that is ``counted``."""
+    """Rows under one title, with how many they are where that is ``counted``; ``folded`` until they are asked for."""
 
     title: str
     rows: Sequence[ListRow]
     counted: bool = True
+    folded: bool = False
 
 
 @frozen
@@ -135,6 +137,10 @@ def lengths(durations_s: Iterable[float]) -> list[float]:
 
 def judged(rows: Sequence[ListRow], repairable: Sequence[ListRow] = ()) -> list[Group]:
     """Motions by what came of them, those that fail first, then ``repairable`` ones: there is a way."""
-    titles: dict[Mark, str] = {"fail": tr("Don't run as they are"), "caution": tr("Doubts"), "pass": tr("Pass")}
-    groups = [Group(title, [row for row in rows if row.mark == mark]) for mark, title in titles.items()]
-    return [*groups[:1], Group(tr("Can be repaired"), repairable), *groups[1:]]
+    fail, caution, passed = ([row for row in rows if row.mark == mark] for mark in ("fail", "caution", "pass"))
+    return [
+        Group(tr("Don't run as they are"), fail),
+        Group(tr("Can be repaired"), repairable),
+        Group(tr("Doubts"), caution),
+        Group(tr("Pass"), passed, folded=len(passed) < len(rows) > MOST_ROWS),
+    ]

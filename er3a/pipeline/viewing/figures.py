@@ -198,7 +198,7 @@ STYLE: dict[RcKeyType, Any] = {
     "xtick.color": INK,
     "ytick.color": INK,
 }
-SIDE = 3.8  # inches, of figures next to a page's picture, whose letters a phone shows as large as the page's
+SIDE = 4.5  # inches, of figures next to a page's picture, whose letters a phone shows as large as the page's
 _COORDINATES = re.compile(r'(?<= )(?:d|x|y)="[^"]*"')
 _DECIMALS = re.compile(r"-?\d+\.\d{2,}")
 _STYLES = re.compile(r'style="[^"]*"')

@@ -624,12 +624,13 @@ const rows = [...document.querySelectorAll(".runs:not(.plain) a[href]")];
 const fix = rows.some((row) => row.dataset.fix) && document.querySelector(".hero .fix"); // it follows the row
 const mark = (shown, part = shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
+  shown?.closest("details")?.setAttribute("open", "");
   if (!fix || fix.toggleAttribute("hidden", !part?.dataset.fix)) return;
-  const { lead, fix: advice, instead } = part.dataset;
+  const { lead, fix: advice, instead, go } = part.dataset;
   fix.querySelector("b").textContent = lead;
   fix.querySelector("span").lastChild.data = ` ${advice}`;
   const link = fix.querySelector("a");
-  if (instead) [link.href, link.textContent] = [instead, instead.includes("until=") ? WORDS.playUpTo : WORDS.show];
+  if (instead) [link.href, link.textContent] = [instead, go];
   link.hidden = !instead || (link.hash === shown.hash && !instead.includes("?")); // nothing else is there to be shown
 };
 addEventListener("advice", ({ detail }) => mark(rows.find((row) => row.ariaCurrent), detail)); // of a part of the row's motion

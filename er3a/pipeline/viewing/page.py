@@ -65,8 +65,6 @@ VERDICT_WORDS = {
 UNSAID = ("round_trips", "units")  # of er3a itself and of files: a reader learns nothing from their passing
 PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("Teach panel")}
 SCRIPT_WORDS = {
-    "show": N_("Show it"),
-    "playUpTo": N_("Play up to it"),
     "sort": N_("sort by this column"),
     "csv": N_("CSV"),
     "svg": N_("download"),
@@ -302,7 +300,6 @@ def render(
             script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
             terms=glossary(),
             verdict_words=VERDICT_WORDS,
-            pages=PAGES,
             at_side=bool(context.pop("at_side", False)),
             language=language.current(),
             summary=summary,
@@ -352,7 +349,12 @@ def page_environment(*folders: Path) -> jinja2.Environment:
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "ensure_ascii": False}  # `closed_up` reads texts
-    environment.globals |= {"view_command": view_command, "numbered": Numbering(), "bracketed": bracketed}
+    environment.globals |= {
+        "view_command": view_command,
+        "numbered": Numbering(),
+        "bracketed": bracketed,
+        "pages": PAGES,
+    }
     environment.filters |= {
         "number": number,
         "measured": measured,

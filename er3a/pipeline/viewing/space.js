@@ -12,7 +12,7 @@ const LAMP = [0.9, -1.3, 2.4];
 const SHADOWS = 1024; // side of the map of shadows, px
 const MAX_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
 const GRID_STEPS = 8; // lines of the floor on each side of the base
-const [PALE, VEIL] = [0.36, 0.7];
+const PALE = 0.36;
 const SMALL = 0.12; // radius of a body that its name would hide, in parts of what is seen
 const HIDDEN = 0.22; // of a line, where a body is before it
 const CREASE = 0.7; // rad between two faces: less is drawn as one that is curved
@@ -113,8 +113,8 @@ export class Space extends Orbit {
     return this.materials.get(key);
   }
 
-  /** A square floor at height `z` around a point, which shadows fall on; `veiled`: what is below is seen to be. */
-  floor(centre, step, z, veiled = false) {
+  /** A square floor at height `z` around a point, which shadows fall on. */
+  floor(centre, step, z) {
     const half = GRID_STEPS * step;
     const ends = Array.from({ length: 2 * GRID_STEPS + 1 }, (_, i) => (i - GRID_STEPS) * step).flatMap((at) => [
       [at, -half], [at, half], [-half, at], [half, at],
@@ -125,11 +125,6 @@ export class Space extends Orbit {
     this.ground.position.set(centre[0], centre[1], z);
     this.ground.receiveShadow = true;
     this.scene.add(this.ground);
-    if (!veiled) return;
-    const veil = Object.assign(new three.Mesh(this.ground.geometry, this.material(this.page.grid, VEIL)), { renderOrder: 1 });
-    veil.position.copy(this.ground.position);
-    veil.scale.setScalar(1.5);
-    this.scene.add(veil);
   }
 
   /** Starts a picture: lines and words of the one before are gone. */

@@ -13,7 +13,16 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
 from er3a.dynamics.plausibility import has_mass, mass_findings
-from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
+from er3a.dynamics.torques import (
+    Demand,
+    TorqueParts,
+    demand,
+    holding_torques,
+    known,
+    power_imbalance,
+    torque_parts,
+    worst_holding,
+)
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
@@ -580,7 +589,7 @@ def _paths(study: Study, name: str, arm: LoadedArm) -> tuple[list[PathTorques], 
 
 def _holding(arm: LoadedArm) -> tuple[model.HoldingTorque, ...]:
     found = worst_holding(arm.model)
-    rest = np.zeros_like(found.q)
+    rest, there = np.zeros_like(found.q), holding_torques(arm.model, found.q)
     tolerance = np.diagonal(arm.tolerance(found.q, rest, rest))
     slides, q = arm.robot.slides, shown(arm.robot, found.q)
     return tuple(
@@ -590,6 +599,7 @@ def _holding(arm: LoadedArm) -> tuple[model.HoldingTorque, ...]:
             tolerance=float(tolerance[j]),
             unit=model.FORCE if slides[j] else model.TORQUE,
             q=tuple(q[j].tolist()),
+            all_there=tuple(there[j].tolist()),
         )
         for j in range(arm.robot.joints)
     )

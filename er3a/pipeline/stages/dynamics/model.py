@@ -102,13 +102,15 @@ class MassesUsed:
 
 @frozen
 class HoldingTorque:
-    """The maximum torque found that a joint holds at rest within the limits, and the pose where it does."""
+    """The maximum torque found that a joint holds at rest within the limits, the pose where it does, and what all
+    joints hold there."""
 
     joint: int
     torque: float
     tolerance: float
     unit: Unit
     q: tuple[float, ...]
+    all_there: tuple[float, ...]
 
 
 def shared_unit(units: Iterable[Unit]) -> str:

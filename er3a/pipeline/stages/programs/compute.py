@@ -35,6 +35,7 @@ from er3a.robots.robot import Robot
 
 OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
 MAX_POINTS = 20_000  # of a program's motion that are kept
+TURNED = 1e-3  # of a rotation's entries, up to which the tool does not turn
 
 
 def compute(study: Study, name: str) -> model.ProgramsResults:
@@ -136,7 +137,8 @@ def _options(study: Study, name: str, listed: ProgramsFile) -> CheckOptions:
 
 def _ended(check: ProgramCheck, found: LocatedFinding, task: MotionTask, options: CheckOptions) -> LocatedFinding:
     """What was found; of a collision towards which one line goes once also where and when (s of its motion) the line
-    may end: the tool point in the line's base, mm, and how clear the arm is up to there."""
+    may end: the tool point in the line's base, mm, how clear the arm is up to there, and whether the tool turns on from
+    there."""
     motions = [motion for number, motion in check.motions.items() if check.execution.steps[number].place == found.place]
     motion = motions[0] if len(motions) == 1 else None
     if not is_one(found.finding, "motion_collides") or motion is None or motion.path is None or motion.base is None:
@@ -149,9 +151,10 @@ def _ended(check: ProgramCheck, found: LocatedFinding, task: MotionTask, options
     last = safe_stop(task, curve, times, along.contacts, others, margin_of(task, options.assumed_margin))
     if last is None:
         return found
-    pose = inverted(motion.base) @ forward(motion.arm, curve.joints(np.array([last.kept_to])))[0]
-    end = tuple((1000 * pose[:3, 3]).tolist())
-    return replace(found, finding=found.finding.but(end_mm=end, end_s=last.kept_to, margin_mm=1000 * last.margin))
+    pose, aim = inverted(motion.base) @ forward(motion.arm, curve.joints(np.array([last.kept_to, times[-1]])))
+    end, turns = tuple((1000 * pose[:3, 3]).tolist()), not np.allclose(pose[:3, :3], aim[:3, :3], atol=TURNED)
+    more = {"end_s": last.kept_to, "margin_mm": 1000 * last.margin, "turns": turns}
+    return replace(found, finding=found.finding.but(end_mm=end, **more))
 
 
 def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, float]) -> model.ProgramSummary:

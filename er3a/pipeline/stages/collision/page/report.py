@@ -79,11 +79,14 @@ def _answer(
     their names.
     """
     params = summary.verdict.finding.params
-    near = summary.verdict.shapes.near if summary.verdict.shapes else ()
+    shapes = summary.verdict.shapes
+    lines = [0.0, *([shapes.margin_mm] if shapes else [])]
     ends = [0.0, *(each.clearance_mm for each in closest)]
     span = min(ends), max(ends)
     scale = tr("bars {low} to {high} mm", low=fixed(span[0], 0), high=fixed(span[1], 0))
-    rows = [_row(each, unreached, near, known.get(each.name), span) for each in closest]
+    second = tr("shapes assumed: ± {mm:g} mm", mm=shapes.margin_mm) if shapes else ""
+    near = shapes.near if shapes else ()
+    rows = [_row(each, unreached, near, known.get(each.name), span, lines) for each in closest]
     hit, clear, partly = (
         [row for row in rows if row.mark in marks]
         for marks in (("fail",), ("pass", "caution", "no_reference"), ("none",))
@@ -112,7 +115,12 @@ def _answer(
         all_caught(caught),
         joined([tr(text, count=count) for text, count in counted if count], " "),
         keys,
-        [Group(joined([title, scale if own is (hit or clear) else ""]), own[:MAX_ROWS]) for title, own in titled],
+        [
+            Group(
+                joined([title, scale if own is (hit or clear) else "", second if own is clear else ""]), own[:MAX_ROWS]
+            )
+            for title, own in titled
+        ],
         next((row.fix for row in hit if row.fix), None),
     )
 
@@ -123,9 +131,11 @@ def _row(
     near: Sequence[str],
     fault: Fault | None,
     span_mm: tuple[float, float],
+    lines_mm: Sequence[float],
 ) -> ListRow:
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
-    which only a part was measured; ``span_mm``: of the whole bar, on which an overlap is left of 0."""
+    which only a part was measured; ``span_mm``: of the whole bar, on which an overlap is left of 0,
+    with ``lines_mm`` across it."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     of_path = found.kind == "path"
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
@@ -138,7 +148,8 @@ def _row(
     fix = fix_of([fault]) if fault and fault.instead and mark == "fail" else None
     zero, end = np.interp([0.0, found.clearance_mm], span_mm, [0.0, 1.0])
     own: PartMark = "fail" if mark == "fail" else "none" if mark == "none" else "pass"
-    parts = [Part(0.0, 1.0, "rest"), Part(min(zero, end), max(zero, end), own), Part(zero, zero, "zero")]
+    lines = [Part(at, at, "zero") for at in np.interp(lines_mm, span_mm, [0.0, 1.0]).tolist()]
+    parts = [Part(0.0, 1.0, "rest"), Part(min(zero, end), max(zero, end), own), *lines]
     return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), 1.0, parts, fix)
 
 

@@ -48,7 +48,7 @@ def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
             holding_name(each.joint),
             holding_text(each),
             q=meant(robot, np.array(each.q)),
-            loads=np.where(np.arange(robot.joints) == each.joint - 1, abs(each.torque), np.tile(np.nan, (2, 1))),
+            loads=np.tile(each.all_there, (2, 1)),
             marks=_weight(robot, results.summary.masses, each),
             elevation=0.0,
         )
@@ -93,7 +93,11 @@ def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> lis
     head = [Mark(0.0, 1.0, tuple(tip), tuple(tip + way - [0, 0, -HEAD_M]), "") for way in (aside, -aside)]
     sides = [Mark(0.0, 1.0, tuple(at), tuple(top), ""), Mark(0.0, 1.0, tuple(centre), tuple(top + lever), "")]
     level = Mark(0.0, 1.0, tuple(top), tuple(top + lever), far)
-    return [level, Mark(0.0, 1.0, tuple(centre), tuple(tip), heavy), *sides, *head]
+    own = []
+    for mass, way in zip(kg, off):
+        start, down = at + way, [0, 0, DROP_M * mass / kg.sum()]
+        own.append(Mark(0.0, 1.0, tuple(start), tuple(start - down), with_unit(number(mass, 3), "kg")))
+    return [level, Mark(0.0, 1.0, tuple(centre), tuple(tip), heavy), *sides, *head, *own]
 
 
 def within(value: float, tolerance: float, decimals: int = 2) -> str:

@@ -29,10 +29,10 @@ DRAWN = 161
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
-    """Torques of all joints with their intervals, and what most of the greatest comes from."""
+    """Torques of all joints with their intervals."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, torque = new_figure(width=SIDE, height=3.9)
-    load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
+    figure, torque = new_figure(width=SIDE, height=4.6)
+    unit = model.shared_unit(load.unit for load in path.joints)
     for j in range(rows.torque.shape[1]):
         colour = JOINTS[j % len(JOINTS)]
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
@@ -40,15 +40,8 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
     torque.legend(ncols=6, handlelength=0.8, loc="lower left", bbox_to_anchor=(0, 1))
     torque.set_ylabel(axis_label(rows, "torque", unit))
-    names = dict(
-        zip(
-            model.PARTS,
-            (tr("gravity"), tr("inertia"), tr("Coriolis, centrifugal"), tr("friction"), tr("forces at the tool")),
-        )
-    )
     torque.set_xlabel(axis_label(rows, "t_s"))
-    most = max(model.PARTS, key=lambda part: getattr(load, part))
-    caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
+    caption = tr("Shaded: tolerance of the masses.")
     return Picture(figure, caption, caption, [(torque, path.name)])
 
 
@@ -71,7 +64,6 @@ def held_parts(robot: Robot, masses: model.MassesUsed | None, held: model.Holdin
 
 MAX_USES = 12
 NONE = "–"
-SEEN = 0.02  # of the longest bar, below which one is a speck
 WITHOUT = words(
     {"load": "load", "friction": "friction", "rotor_inertias": "rotors", "link_masses": "mass of link {links}"}
 )
@@ -180,7 +172,7 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         tr("± from the masses. Not included: {parts}.", parts=joined(left, ", ")) if left else "",
         [payload],
         [
-            Group(title, [row for row in found if row.parts[0].end >= SEEN], counted=False)
+            Group(title, found, counted=False)
             for title, found in (
                 (tr("Greatest torque on the paths"), rows),
                 (
@@ -211,12 +203,13 @@ def _row(
     name: str,
     moment: tuple[str, float],
     most: float,
-    limit: float | None = None,
+    limit: float | None = 0.0,
 ) -> ListRow:
-    """What a joint needs at a moment with its tolerance, as a bar of its limit, or else of the scale of all."""
+    """What a joint needs at a moment with its tolerance, as a bar of its limit, or else of the scale of all; ``limit``:
+    None where it is not known, 0 where it is not asked for."""
     value, (share, spread) = within(*need, decimals=1), np.minimum(1.0, np.array(need) / (limit or most))
-    if limit:
-        value = tr("{value} of {limit}", value=value, limit=number(limit, 2))
+    if limit != 0:
+        value = tr("{value} of {limit}", value=value, limit=number(limit, 2) if limit else "?")
     mark = _mark(motor) if limit else "none"
     parts = [Part(0.0, share, mark), Part(share, 1.0, "rest"), Part(share - spread, share + spread, "spread")]
     return ListRow(mark, name, with_unit(value, motor.unit), f"#{moment[0]}", moment, 1.0, parts)

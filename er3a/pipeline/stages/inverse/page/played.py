@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from er3a.collision.bodies import Bodies
 from er3a.finding import Finding, is_one
 from er3a.geometry.transforms import transform
 from er3a.kinematics.inverse import inverse
@@ -17,6 +18,7 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
 from er3a.pipeline.stages.inverse.model import SolutionRows, TargetResult
+from er3a.pipeline.stages.trajectory.page.played import gap
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 from er3a.selection.regular_first import SINGULAR_PARTS
@@ -26,17 +28,20 @@ Position = tuple[float, float, float]
 MAX_GHOSTS = 8  # solutions that are drawn at a time: more hide each other
 
 
-def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> PlayedMotion:
+def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows, bodies: Bodies | None) -> PlayedMotion:
     """The arm in each branch that solves a target, among all of them, pale; without one where it comes nearest.
 
     Parameters
     ----------
     rows : the best row of each branch, in the order in which they are shown
+    bodies : of the arm and its scene, to which the gap of the chosen one is drawn; None where it is not
     """
     q = meant(robot, rows.q_deg if len(rows) else np.array([target.q_ref_deg]))
     events = [_solution_event(rows, k) for k in range(len(rows))]
     events = events or [PlayedEvent(0.0, SHOWN_S, outcome_word(target.outcome), "fail")]
     marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
+    if bodies and target.clearance and len(rows):
+        marks.append(gap(bodies, q[0], target.clearance.least_mm, 0.0, SHOWN_S))
     near = target.neighbours if not len(rows) else None
     if near and near.shifted_to_mm and near.least_shift_mm:
         pose = transform(np.array(near.shifted_to_mm) / 1000, np.radians(target.rpy_deg))

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from markupsafe import Markup
 
+from er3a.collision.bodies import Bodies
 from er3a.finding import is_one
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
@@ -49,10 +50,12 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     def of_target(target: model.TargetResult) -> model.SolutionRows:
         return results.solutions.take(names == target.name)
 
-    played = [solutions_played(robot, target, best_of_branches(of_target(target))) for target in chosen]
+    scene = study.scene(name, stored.stage)
+    bodies = None if stored.withheld else Bodies(robot, scene)
+    played = [solutions_played(robot, target, best_of_branches(of_target(target)), bodies) for target in chosen]
     answer, shown = both_arms(study, stored, played) or (
         _answer(results.targets, chosen),
-        {"player": player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen))},
+        {"player": player(robot, played, scene, opened=_opened(chosen))},
     )
     render_stage(
         study,
@@ -128,7 +131,7 @@ def _row(target: model.TargetResult) -> ListRow:
 
 
 def _jogged(q_deg: Iterable[float]) -> Fix:
-    return Fix(tr("jog from there in the teach panel."), panel_address(q_deg), instead=False)
+    return Fix(tr("save it as a point of a program."), panel_address(q_deg), instead=False)
 
 
 def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> dict[str, Any]:

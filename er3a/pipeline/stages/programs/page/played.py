@@ -79,16 +79,21 @@ def _end_s(found: FindingAt) -> float | None:
 
 
 def _marks(program: ProgramSummary, rows: ProgramMotion) -> list[Mark]:
-    """Where lines that meet something may end; of those that leave what the arm reaches the way to their target."""
+    """Where lines that meet something touch it and may end; of those that leave what the arm reaches the way to their
+    target."""
     marks = []
     for found in program.findings:
+        touches = found.finding.params.get("touches")
+        if touches and found.program_s is not None:
+            place = touches[0].place_m
+            marks.append(Mark(found.program_s, float(rows.t_s[-1]), place, place, tr("first contact")))
         if (end := _end_s(found)) is not None:
             said = tr("safe end: {far} mm clear", far=fixed(found.finding.margin_mm, 1))
             x, y, z = (float(np.interp(end, rows.t_s, own)) / 1000 for own in rows.xyz_mm.T)
             marks.append(Mark(end - MOMENT, found.program_s or end, (x, y, z), (x, y, z), said))
-        if place := found.finding.params.get("target_m"):
+        if target := found.finding.params.get("target_m"):
             tip = rows.xyz_mm[np.searchsorted(rows.t_s, (found.program_s or 0.0) - MOMENT)] / 1000
-            marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(place), tr("not reachable")))
+            marks.append(Mark(0.0, float(rows.t_s[-1]) + 1.0, tuple(tip.tolist()), tuple(target), tr("not reachable")))
     return marks
 
 
@@ -102,10 +107,10 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
     end = max(start, min(own, default=start))
     if is_one(finding, "motion_collides"):
         begun = start - (found.motion_s or 0.0)  # of the line's motion
-        touches = [(begun + each.t_s, each.pair) for each in finding.touches]
+        touches = [(begun + each.t_s, each) for each in finding.touches]
         return [
-            PlayedEvent(t, max(t, end), tr("collision: {pair}", pair=say(pair)), weight, names_of(pair))
-            for t, pair in touches
+            PlayedEvent(t, max(t, end), tr("collision: {pair}", pair=say(each)), weight, names_of(each.pair))
+            for t, each in touches
         ]
     if is_one(finding, "too_fast"):
         needed = times_needed(rate_ratio(finding))

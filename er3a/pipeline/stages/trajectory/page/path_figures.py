@@ -54,7 +54,7 @@ def nearness_picture(
     shapes : the assumed ones, which may be wrong by their margin; None where none are assumed
     path : whose faults are marked, if it has any; None of a motion that repairs them
     """
-    figure, ax = new_figure(width=SIDE, height=2.0)
+    figure, ax = new_figure(width=SIDE, height=2.4)
     ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
     if path and path.verdict != "safe":
         _mark(ax, path)
@@ -83,7 +83,7 @@ def fault_picture(name: str, path: model.PathSummary, rows: Any, before: model.P
     rows : of the path, or of the avoidance strategy that repairs it
     before : of the path, if the motion repairs it
     """
-    figure, ax = new_figure(width=SIDE, height=2.0)
+    figure, ax = new_figure(width=SIDE, height=2.4)
     fast = path.too_fast and path.verdict != "singular" and not path.of("unreachable")
     edge = before is None and path.of("unreachable") and any(each.type == "elbow" for each in path.singularities)
     column, label, title = "smallest_singular_value", tr("smallest singular value"), tr("Distance from singular poses")

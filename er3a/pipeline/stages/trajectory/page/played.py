@@ -79,7 +79,9 @@ def motions(
         seen += safe_end(path, results.clearance)
         marks, q = [*contact(path), *_beyond(path, whole)], meant(robot, rows.q_deg)
         if near and path.clearance and scene:
-            marks.append(_gap(Bodies(robot, scene), path.clearance, rows.t_s, q))
+            least = path.clearance
+            then = np.array([np.interp(least.t_s, rows.t_s, own) for own in q.T])
+            marks.append(gap(Bodies(robot, scene), then, least.least_mm, least.t_s - MOMENT, least.t_s + MOMENT))
         motions.append(PlayedMotion(path.name, text, rows.t_s, q, seen, marks, whole_s=path.duration_s))
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
@@ -90,12 +92,16 @@ def motions(
     return motions
 
 
-def _gap(bodies: Bodies, least: model.MinClearance, t: Reals, q: Reals) -> Mark:
-    """Where a motion, joint values ``q`` (N, n) at times ``t`` (N,), is nearest to anything, as a line there."""
-    then = np.array([[np.interp(least.t_s, t, own) for own in q.T]])
-    start, end = bodies.surface_points(then[0], int(bodies.min_distance(then)[1][0])).tolist()
-    far = with_unit(fixed(least.least_mm, 1), "mm")
-    return Mark(least.t_s - MOMENT, least.t_s + MOMENT, start, end, far)
+def gap(bodies: Bodies, q: Reals, far_mm: float, t0: float, t1: float) -> Mark:
+    """Where the arm is nearest to anything, as a line from ``t0`` to ``t1`` (s) with that distance.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+    far_mm : how near, as the results say it
+    """
+    start, end = bodies.surface_points(q, int(bodies.min_distance(q[None])[1][0])).tolist()
+    return Mark(t0, t1, start, end, with_unit(fixed(far_mm, 1), "mm"))
 
 
 def _nearest(least: model.MinClearance | None) -> list[PlayedEvent]:

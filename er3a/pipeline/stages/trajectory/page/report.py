@@ -264,7 +264,8 @@ def both_arms(
         "",
         tr("The tool lands up to {far} off.", far=most),
         tr("Both arms have the same joint values."),
-        groups=[Group(tr("Flange off, this table against the right one"), listed)],
+        [(f"{fixed(1000 * rows[-1][0], 0)}–{most}", tr("flange off at worst"))],
+        [Group(tr("Flange off, this table against the right one"), listed)],
     )
     signs = [own_title(arm.title) for arm in arms]
     drawn = player(arms[0], seen, beside=arms[1:], signs=signs, opened=opened)

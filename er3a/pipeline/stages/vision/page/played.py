@@ -35,7 +35,8 @@ def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[Play
     """The way to each object and away from it; the arm where it waits for an object that it does not grasp."""
     home, objects = meant(robot, np.array(task.home_deg)), results.summary.objects
     moved = [_moved(robot, each) for each in objects if each.moved_to_mm]
-    return [*(_motion(robot, results, each, home) for each in objects), *moved]
+    allowed = min(task.gripper.tolerance_mm)
+    return [*(_motion(robot, results, each, home, allowed) for each in objects), *moved]
 
 
 def moved_name(each: ObjectResult) -> str:
@@ -63,7 +64,7 @@ def _moved(robot: Robot, each: ObjectResult) -> PlayedMotion:
     return at_rest(robot, moved_name(each), tr("Can be grasped here"), "plain", q, marks=marks)
 
 
-def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Reals) -> PlayedMotion:
+def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Reals, allowed_mm: float) -> PlayedMotion:
     rows = results.ways.take(results.ways.target == each.name)
     if each.grasp is None or not len(rows):
         hit = each.refusal.params if is_one(each.refusal, "grasp_collides") else {}
@@ -74,7 +75,10 @@ def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Real
         return at_rest(robot, each.name, refusal_text(each), "fail", q, bodies, marks=[mark])
     parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
     events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
-    text = tr("At the grasp: {grasp}, turned by {turn}°", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
+    text = tr("Can be grasped here")
+    if each.error_mm:
+        off = fixed(each.error_mm.together, 1)
+        text = tr("At the grasp: {off} mm off at most, {allowed:g} mm allowed", off=off, allowed=allowed_mm)
     there = grasp_moment(results, each)[1]
     events.append(PlayedEvent(there, there, text, "plain"))
     return PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events)
@@ -115,11 +119,6 @@ def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[
     frame = 0 if fixed_camera else robot.rows + 1
     common = {"frame": frame, "name": tr("camera"), "T": T.tolist(), "colour": REFERENCE}
     corners = _corners(task, SIGHT * task.view.farthest_mm / 1000)
-    if fixed_camera and summary.objects:  # what it sees of the plane on which objects are
-        down = min(placed(each)[2, 3] for each in summary.objects) - OBJECT_M[2] / 2 - T[2, 3]
-        reached = down / (corners @ T[2, :3])
-        far = task.view.farthest_mm / 1000 / corners[:, 2]
-        corners *= np.where((reached > 0) & (reached < far), reached, far)[:, None]
     points = np.concatenate([np.zeros((1, 3)), corners])
     sight = []
     for i, j in EDGES:

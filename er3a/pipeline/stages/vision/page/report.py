@@ -49,7 +49,7 @@ CUT = 0.9  # of the height of a figure, where bars end that are longer than it
 def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> Picture:
     """Length of each sample's residual of position; one that was left out is cut off, and named."""
     size, mean, order = np.linalg.norm(rows.residual_mm, axis=1), 1.6 * found.camera_mm, np.arange(1, len(rows) + 1)
-    figure, ax = new_figure(width=SIDE, height=1.9)
+    figure, ax = new_figure(width=SIDE, height=2.2)
     ax.bar(order[rows.used], size[rows.used], color=MODEL, label=tr("used"))
     ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("expected mean"))
     top = 1.3 * max(mean, size[rows.used].max(initial=0.0))
@@ -67,7 +67,8 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlabel(tr("sample"))
     ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
-    caption = tr("Residual of each sample.")
+    ax.set_xlim(0.4, len(rows) + 0.6)
+    caption = tr("Calibration: residual of each sample.")
     return Picture(figure, caption, caption)
 
 
@@ -196,7 +197,8 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     least = _least_sure(objects)
     if least and least.grasp and least.error_mm:
         made = joined([tr("in 95 % of grasps"), tr("simulated") if found and found.simulated else ""], ", ")
-        allowed = tr("within {limit:g} mm, {turn:g}°: {name}", limit=limit, turn=turn, name=least.name)
+        asked = {"least": 100 * summary.least_success, "limit": limit, "turn": turn}
+        allowed = tr("{name}: {least:g} % needed within {limit:g} mm, {turn:g}°", name=least.name, **asked)
         keys = [
             (f"{fixed(100 * least.grasp.probability, 1)} %", allowed),
             (tr("{far} off", far=with_unit(fixed(least.error_mm.together, 1), "mm")), made),
