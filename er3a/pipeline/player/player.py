@@ -254,8 +254,6 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
             picture.word(mark.text, np.array(mark.start), "fail" if colours else "ink")
         elif mark.t0 <= t <= mark.t1:
             picture.line(np.array([mark.start, mark.end]), INK, 1.5)
-    for sign, own in zip(data["signs"], poses):
-        picture.word(sign["text"], own[3, :3, 3], "ink")
     for shape in data["scene"]:
         if "pale" not in shape:
             picture.word(shape["name"], np.array(shape["T"])[:3, 3], "fail" if shape["name"] in colours else "ink")
