@@ -163,6 +163,8 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
     if not whole:
         return
     found = whole[-1] | whole[0]
+    if any(mark == ":" for _, mark, _ in found.get("q", {}).values()):
+        found.pop("theta", None)  # what the program computes for a pose
     quantities = dict(zip(quantities_of(found), found.values()))
     lines = code.text.split("\n") if len(found) == 3 and "DH_A" not in code.text else []
     for used in _USED.finditer("\n".join(lines)):

@@ -113,7 +113,7 @@ _SEVERAL = re.compile(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n
 _NAMED_SUM = re.compile(r"[-+*/]\s*(?![qθ]|th)[^\W\d]|(?![qθ]|th)[^\W\d]\w*\s*[-+*/]")
 """Arithmetic with a constant that has a name, as a drawing has it and no pose."""
 _IN_UNIT = re.compile(
-    r"\b(?:length|unit|distance|dimension|measure)[\w \"']*[^\n.;]{0,25}?(?:\bin\b|[:=(\[])[\s\"']{0,2}"
+    r"\b(?:length|unit|distance|dimension|measure)[\w \"']*[^.;]{0,25}?(?:\bin\b|[:=(\[])[\s\"']{0,2}"
     r"(mm|cm|m|inch|met(?:er|re)s?)\b",
     re.I,
 )
