@@ -46,9 +46,9 @@ Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
-ALIGN_POSES, ALIGNED, STEPS = 100, 30, {"maxiter": 5}  # of the first round; rounds, and steps in each
+ALIGN_POSES, ALIGNED, STEPS = 100, 20, {"maxiter": 5}  # of the first round; rounds, and steps in each
 CLIMB = 10  # steps to a worst pose in each round
-SAME_FOUND = 1 + 5e-4  # of the worst distance in an alignment, when a search ends
+SAME_FOUND = 1 + 1e-3  # of the worst distance in an alignment, when a search ends
 SLOPE_STEP = 1e-7  # m, rad, between alignments of which a slope is the difference
 NEAR_WORST = 0.8  # of it, from which on a pose is kept
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
