@@ -25,12 +25,12 @@ from er3a.comparison.slips import SIDES, Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
 from er3a.geometry.transforms import (
     exp_rotation,
-    log_rotation,
     nearest_rotations,
     posed,
     rot_x,
     rot_z,
     rotation_angle,
+    skew_part,
     translation,
 )
 from er3a.geometry.vectors import wrap_to_pi
@@ -435,11 +435,10 @@ def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
 
 def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
-    turn = log_rotation(T[:3, :3])
-    angle = float(np.linalg.norm(turn))
-    axis = turn / angle if angle > NO_TURN else np.array([0.0, 0.0, 1.0])
-    if angle > HALF_TURN:
-        axis *= np.sign(axis[np.abs(axis).argmax()])
+    R = T[:3, :3]
+    angle = float(rotation_angle(np.eye(3), R))
+    axis = np.linalg.eigh(R + R.T)[1][:, -1] if angle > NO_TURN else np.array([0.0, 0.0, 1.0])
+    axis *= np.sign(axis[np.abs(axis).argmax()] if angle > HALF_TURN or angle <= NO_TURN else axis @ skew_part(R))
     u, v, w = (axis + 0.0).tolist()
     about = Turn(math.degrees(angle), (u, v, w))
     return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), about, entries)
