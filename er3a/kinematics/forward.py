@@ -350,7 +350,7 @@ def _forward_by_arrays(q: Reals, joint: Reals, links: Reals, out: Reals) -> None
     """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow. No product is BLAS's,
     whose last bit depends on the number of threads."""
     turns = q.T * joint[_SIGN, :, None]
-    x, y, z, place = (np.repeat(links[0, :3, k, None], len(q), axis=1) for k in range(4))
+    x, y, z, place = links[0, :3, :, None].swapaxes(0, 1)
     cosines, sines = np.cos(turns + joint[_START, :, None]), np.sin(turns + joint[_START, :, None])
     for k, link in enumerate(links[1:]):
         if joint[_SLIDES, k]:
@@ -358,10 +358,11 @@ def _forward_by_arrays(q: Reals, joint: Reals, links: Reals, out: Reals) -> None
         else:
             x, y = cosines[k] * x + sines[k] * y, cosines[k] * y - sines[k] * x
         # Most entries of a link's transform are 0.
-        axes = (sum(own * each for own, each in zip(column, (x, y, z)) if own) for column in link[:3].T.tolist())
-        x, y, z, shift = axes
+        columns = (sum(own * each for own, each in zip(column, (x, y, z)) if own) for column in link[:3].T.tolist())
+        x, y, z, shift = columns
         place = place + shift
-    out[:, :3] = np.stack([x, y, z, place], axis=2).swapaxes(0, 1)
+    for k, column in enumerate((x, y, z, place)):
+        out[:, :3, k] = column.T
     out[:, 3] = 0.0, 0.0, 0.0, 1.0
 
 
