@@ -76,7 +76,7 @@ def read_dh_table(
     Parameters
     ----------
     name : of the robot
-    convention : None means standard, unless the table says another, or can hardly be read so
+    convention : None means standard, unless the table says another, or its numbers are a known arm's in the other alone
     length_unit, angle_unit : units of a table whose column names say mm and deg although its values are in other units;
         None means mm and deg, unless the values can't be
     as_printed : keep values in the unit that their column says although they look like another; each gives a
@@ -136,12 +136,12 @@ def read_dh_table(
     if short or 0 < longest < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
     found = parse(RobotFile, content, path, AS_PRINTED if as_printed else None)
-    known = _known_as(found) if said is None else said
-    if known == "modified" and said is None:
+    way = said or _known_as(found)
+    if way == "modified" and not said:
         form: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "as_printed": as_printed, "text": text}
-        found, notes = read_dh_table(path, name, known, columns=columns, **form)
-        return found, (*notes, "the table was read as modified D-H, as which it is a known arm's, and as standard none's")
-    if known is None and idle:
+        other, assumed = read_dh_table(path, name, way, columns=columns, **form)
+        return other, (*assumed, "read as modified D-H: so it is a known arm's, as standard D-H none's")
+    if way is None and idle:
         problem = "read as standard D-H, joints 1 and 2 turn about one line; read as modified D-H, none do"
         remedy = "Write modified D-H or standard D-H above the table, or say it by --convention"
         raise InputError(path, "convention", problem, remedy)

@@ -425,7 +425,9 @@ def test_rows_without_a_variable_are_base_and_flange_and_sliding_joints_keep_the
 
 def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
     values = "d1 = 0.38; a1 = 0; alpha1 = 0;\nd2 = 0; a2 = 0.35; alpha2 = -pi/2;\n"
-    content, _ = read(tmp_path, "% standard D-H\n" + values + "M = [theta1 d1 a1 alpha1;\n     theta2-pi/2 d2 a2 alpha2];\n")
+    content, _ = read(
+        tmp_path, "% standard D-H\n" + values + "M = [theta1 d1 a1 alpha1;\n     theta2-pi/2 d2 a2 alpha2];\n"
+    )
     np.testing.assert_allclose(numbers(content), [(0, 0, 380, 0), (350, -90, 0, -90)])
 
 
@@ -989,7 +991,11 @@ def test_a_known_arm_settles_the_convention_that_its_table_does_not_say(tmp_path
             "a",
             [75, 650],
         ),
-        ("l1 = 300 # in the drawing\n# standard D-H: theta d a alpha\nM = [[q1, 0, l1, 90], [q2, 0, l1, 0]]\n", "a", [300] * 2),
+        (
+            "l1 = 300 # in the drawing\n# standard D-H: theta d a alpha\nM = [[q1, 0, l1, 90], [q2, 0, l1, 0]]\n",
+            "a",
+            [300] * 2,
+        ),
         (
             "% standard D-H\nDH = [0 -90 290 0; 270 0 0 -90];\na = DH(i,1);\nalpha = deg2rad(DH(i,2));\nd = DH(i,3);\n"
             "theta = deg2rad(DH(i,4));\n",
@@ -1067,7 +1073,9 @@ def test_a_list_may_be_one_number_as_often_as_there_are_joints(tmp_path):
 
 
 def test_whole_numbers_say_nothing_of_inches(tmp_path):
-    content, _ = read(tmp_path, "% standard D-H: theta d a alpha\nM = [0 130 0 0;\n 0 0 sqrt(144^2 + 58^2) 0;\n 0 0 144 0];\n")
+    content, _ = read(
+        tmp_path, "% standard D-H: theta d a alpha\nM = [0 130 0 0;\n 0 0 sqrt(144^2 + 58^2) 0;\n 0 0 144 0];\n"
+    )
     assert content.dh.rows[0].d_mm == pytest.approx(130)
 
 
