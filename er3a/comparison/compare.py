@@ -12,7 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -25,12 +25,12 @@ from er3a.comparison.slips import SIDES, Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
 from er3a.geometry.transforms import (
     exp_rotation,
-    log_rotation,
     nearest_rotations,
     posed,
     rot_x,
     rot_z,
     rotation_angle,
+    skew_part,
     translation,
 )
 from er3a.geometry.vectors import wrap_to_pi
@@ -46,9 +46,9 @@ Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
-ALIGN_POSES, ALIGNED, STEPS = 100, 30, {"maxiter": 5}  # of the first round; rounds, and steps in each
+ALIGN_POSES, ALIGNED, STEPS = 100, 20, {"maxiter": 5}  # of the first round; rounds, and steps in each
 CLIMB = 10  # steps to a worst pose in each round
-SAME_FOUND = 1 + 5e-4  # of the worst distance in an alignment, when a search ends
+SAME_FOUND = 1 + 1e-3  # of the worst distance in an alignment, when a search ends
 SLOPE_STEP = 1e-7  # m, rad, between alignments of which a slope is the difference
 NEAR_WORST = 0.8  # of it, from which on a pose is kept
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
@@ -435,11 +435,10 @@ def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
 
 def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
-    turn = log_rotation(T[:3, :3])
-    angle = float(np.linalg.norm(turn))
-    axis = turn / angle if angle > NO_TURN else np.array([0.0, 0.0, 1.0])
-    if angle > HALF_TURN:
-        axis *= np.sign(axis[np.abs(axis).argmax()])
+    R = T[:3, :3]
+    angle = float(rotation_angle(np.eye(3), R))
+    axis = np.linalg.eigh(R + R.T)[1][:, -1] if angle > NO_TURN else np.array([0.0, 0.0, 1.0])
+    axis *= np.sign(axis[np.abs(axis).argmax()] if angle > HALF_TURN or angle <= NO_TURN else axis @ skew_part(R))
     u, v, w = (axis + 0.0).tolist()
     about = Turn(math.degrees(angle), (u, v, w))
     return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), about, entries)
@@ -540,37 +539,41 @@ def _aligned(
 
     def moved(x: Reals) -> Alignment:
         """Turned (rad) and shifted (m) at the base, shifted at the flange, other zeros after the first; x (..., p)."""
-        base, flange = posed(exp_rotation(x[..., :3]), x[..., 3:6]), posed(exp_rotation(0 * x[..., :3]), x[..., 6:9])
+        plain = np.broadcast_to(np.eye(3), (*x.shape[:-1], 3, 3))
+        base, flange = posed(exp_rotation(x[..., :3]), x[..., 3:6]), posed(plain, x[..., 6:9])
         zeros = start.zeros + np.concatenate([0 * x[..., :1], x[..., 9:]], axis=-1)
         return Alignment(base @ start.base, start.flange @ flange, zeros, start.signs)
 
-    def flanges(by: Alignment, poses: Reals) -> tuple[Reals, Reals]:
-        """A's flanges (k, 4, 4), and those of B as one alignment or several of them, (..., k, 4, 4), bring them."""
-        u = row_values(a, poses)
+    def brought(by: Alignment, u: Reals) -> Reals:
+        """B's flanges at A's rows u (k, m) as one alignment or several of them, (..., k, 4, 4), bring them."""
         rows = by.signs * (u - (by.zeros * a.direction)[..., None, :])
         there = forward_of_rows(b, rows.reshape(-1, b.rows)).reshape(*rows.shape[:-1], 4, 4)
-        return forward_of_rows(a, u), by.base[..., None, :, :] @ there @ np.linalg.inv(by.flange)[..., None, :, :]
+        return by.base[..., None, :, :] @ there @ np.linalg.inv(by.flange)[..., None, :, :]
 
-    def now(poses: Reals) -> tuple[Reals, Reals]:
-        return flanges(moved(x), poses)
+    def flanges(by: Alignment, poses: Reals) -> tuple[Reals, Reals]:
+        """A's flanges (k, 4, 4), and those of B, aligned."""
+        u = row_values(a, poses)
+        return forward_of_rows(a, u), brought(by, u)
 
     def room(y: Reals) -> Reals:
         """By how much the distance at each pose is below the bound, the last of y (..., p + 1)."""
-        return y[..., -1:] - shift_between(*flanges(moved(y[..., :-1]), q))
+        return y[..., -1:] - shift_between(own, brought(moved(y[..., :-1]), u))
 
     def slopes(y: Reals) -> Reals:
         there, *near = room(np.vstack([y, y + SLOPE_STEP * np.eye(len(y))]))
         return np.transpose(near - there) / SLOPE_STEP
 
-    nearer = {"type": "ineq", "fun": room, "jac": slopes}
+    search: Any = {"jac": lambda y: np.eye(len(y))[-1], "constraints": {"type": "ineq", "fun": room, "jac": slopes}}
     for _ in range(1 if same else ALIGNED):
-        off, ends = worst_poses(shift_between, now, a, PEAK_STEPS if same else CLIMB)
+        off, ends = worst_poses(shift_between, partial(flanges, moved(x)), a, PEAK_STEPS if same else CLIMB)
         if off[0] < least:
             best, least = moved(x), off[0]
         if least <= bound * SAME_FOUND:
             break
         q = np.r_[q, ends]
-        y = scipy.optimize.minimize(lambda y: y[-1], np.r_[x, off[0]], constraints=nearer, options=STEPS).x.round(SHOWN)
+        u = row_values(a, q)
+        own = forward_of_rows(a, u)
+        y = scipy.optimize.minimize(lambda y: y[-1], np.r_[x, off[0]], options=STEPS, **search).x.round(SHOWN)
         x, bound = y[:-1], y[-1]
         q = q[room(y) < (1 - NEAR_WORST) * bound]
     one, other = (each[:, :3, :3] for each in flanges(best, q))

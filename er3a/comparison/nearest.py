@@ -60,12 +60,26 @@ def likely(robot: Robot, others: Mapping[str, Robot]) -> list[str]:
     alike = [name for name, other in others.items() if np.array_equal(other.sliding, robot.sliding)]
     if not alike:
         return []
-    pairs = [invariants(others[name]) for name in alike]
-    lengths, angles = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
-    misfit = np.min([_misfits(robot, way, lengths, angles) for way in CONVENTIONS], axis=0)
+    misfit = misfits(robot, [others[name] for name in alike]).min(axis=0)
     order = np.argsort(misfit, kind="stable")
     count = max(MOST, int((misfit <= misfit[order[0]] + 1e-9).sum()))
     return [alike[k] for k in order[:count]]
+
+
+def misfits(robot: Robot, others: Sequence[Robot]) -> Reals:
+    """About how many numbers of several arms a table has otherwise, in the best unit.
+
+    Parameters
+    ----------
+    robot : the table
+    others : with as many rows, of the same kinds
+
+    Returns
+    -------
+    misfit : (2, k), with the table read in each of ``CONVENTIONS``
+    """
+    lengths, angles = (np.array(each) for each in zip(*map(invariants, others)))
+    return np.array([_misfits(robot, way, lengths, angles) for way in CONVENTIONS])
 
 
 def _misfits(robot: Robot, convention: str, lengths: Reals, angles: Reals) -> Reals:

@@ -31,7 +31,7 @@ NamedList = tuple[str, Words, int, str]
 _NAMED = re.compile(
     r"""
     (?P<name>[A-Za-zα-ωΑ-Ω]\w*)["']?\]?                      # a, "a" or row["a"]
-    (?:\[\d*\]|\(1:\w+\))?\s*                              # C's a[6], MATLAB's a(1:6)
+    (?:\[(?:\d*|[A-Z]\w*)\]|\(1:\w+\))?\s*                 # C's a[6] or a[N], MATLAB's a(1:6)
     (?::(?:[ ]*\[\w+;[ ]*\d+\][ ]*|[^=:\n"'\d]*)(?==))?   # its type: Rust's a: [f64; 6] =, Python's a: list =
     (?P<mark>[=:])\s*
     (?:[\w.]+\(\s*|np\.r_\s*|c|\[[\d.]*\]\w+)?["']?$      # np.array(, np.r_, R's c(, Go's []float64
@@ -77,10 +77,13 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
             quantity = "pose" if name != "q" and re.search("[1-9π]", text) else ""
             quantity = "offset" if re.search(_SUMMED.replace("NAME", name), program) else quantity
         quantity = "alpha" if quantity == "a" and "π" in text else quantity
+        if quantity == "a" and name[0] in "rR" and columns.get("a", "r")[-1][0] not in "rR":
+            quantity = "d"  # Khalil's r, with a
         of_others = name in "Ll" and columns.get("a", "r")[-1] not in "rR"
         if quantity not in _OF_VECTORS or not cells or of_others:
             continue
-        title = f"{quantity}(i-1)" if heading and heading.before else "r" if name == "r" else quantity
+        as_printed = "r" if name == "r" and quantity == "a" else quantity
+        title = f"{quantity}(i-1)" if heading and heading.before else as_printed
         _, first, place, other = columns.setdefault(quantity, (title, cells, line, name))
         if first != cells and quantity not in ("theta", "pose"):
             raise InputError(
@@ -116,6 +119,10 @@ _USED = re.compile(
     re.I,
 )
 """Symbols that are entries of a matrix, or a sum with a joint's variable."""
+
+
+_VARIABLE = re.compile(r"\b(?:q|th(?:eta)?)_?[\[({]?\d", re.I)
+"""A joint's variable: an entry of a line that has one is a row's, and its theta that variable."""
 
 
 _SUMMED = (
@@ -156,11 +163,16 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
     if not whole:
         return
     found = whole[-1] | whole[0]
+    if any(mark == ":" for _, mark, _ in found.get("q", {}).values()):
+        found.pop("theta", None)  # what the program computes for a pose
     quantities = dict(zip(quantities_of(found), found.values()))
-    if len(found) == 3 and "DH_A" not in code.text and (used := _USED.search(code.text)):
-        code.refuse(used.start(), used[0], "is no column of a table", "Write a list of theta or offset")
+    lines = code.text.split("\n") if len(found) == 3 and "DH_A" not in code.text else []
+    for used in _USED.finditer("\n".join(lines)):
+        if used[0][0] not in "[(,;" or not _VARIABLE.search(lines[code.line(used.start()) - 1]):
+            code.refuse(used.start(), used[0], "is no column of a table", "Write a list of theta or offset")
     for name, entries in found.items():
-        cells = {k: value for k, (value, _, _) in entries.items()}
+        own = {*quantities["alpha"]} if place_of(name) == "a" else {*entries}  # a6 of a flange is no row's
+        cells = {k: value for k, (value, _, _) in entries.items() if k in own}
         _, mark, place = entries[max(entries)]
         of_link = quantities["alpha" if place_of(name) in ("alpha", "a") else "d"]
         first = min(entries) if len(entries) == len(of_link) else min(of_link)
@@ -288,10 +300,10 @@ class Lists:
                         if key < 0:
                             raise IndexError(key)
                     value = value if key == ":" else value[key]
+            row = ", ".join(value)
         except (KeyError, IndexError, ValueError, TypeError):
             return found[0]
         self.taken.add(found[1])
         if isinstance(value, str):
             return f"({value})" if re.search(r"[-+*/]", value) else value
-        row = ", ".join(value)
         return row if found.string[: found.start()].rstrip()[-1:] in ("[", "*") else f"[{row}]"

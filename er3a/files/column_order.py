@@ -102,7 +102,10 @@ def _columns_in(texts: Iterable[str], width: int) -> Words:
 def _indexed(code: Code) -> Iterator[str]:
     """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
     found: dict[str, dict[int, str]] = {}
-    pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"
+    pattern = (
+        r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*|(?:\w+\.)?(?:deg2rad|radians)\()?"
+        r"([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"
+    )
     for name, row, number in re.findall(pattern, code.text):
         if heading_of(name):
             found.setdefault(row, {})[int(number)] = name

@@ -18,7 +18,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -57,6 +57,7 @@ SHORTEST_LINK_MM = 80.0  # longest link of an arm in mm; the same number of cm i
 ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3), (0.5, 0.0135, 3)
 """What lengths in mm are multiples of, how nearly if they were in another unit, and how many it takes to say so."""
 ASSUMED_SLIDE_MM = 1000.0
+ONE_ENTRY, OTHERWISE = 1.2, 2.0  # numbers that a known arm has otherwise: one wrong entry; more in the other convention
 
 
 def read_dh_table(
@@ -75,7 +76,7 @@ def read_dh_table(
     Parameters
     ----------
     name : of the robot
-    convention : None means standard, unless the table says another, or can hardly be read so
+    convention : None means standard, unless the table says another, or its numbers are a known arm's in the other alone
     length_unit, angle_unit : units of a table whose column names say mm and deg although its values are in other units;
         None means mm and deg, unless the values can't be
     as_printed : keep values in the unit that their column says although they look like another; each gives a
@@ -109,11 +110,8 @@ def read_dh_table(
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
     said = next(iter(stated), convention)
     # A first row without a and alpha is usual in Craig's tables; read as standard, two joints would do one's work.
-    idle = [not (row["a_mm"] or row["alpha_deg"]) for row in rows if row.get("type") not in FIXED]
-    if said is None and not as_printed and sum(idle) == 1 and idle[0] and idle[1:] and _unit(rows[1]) == "deg":
-        problem = "read as standard D-H, joints 1 and 2 turn about one line; read as modified D-H, none do"
-        remedy = "Write modified D-H or standard D-H above the table, or say it by --convention"
-        raise InputError(path, "convention", problem, remedy)
+    still = [not (row["a_mm"] or row["alpha_deg"]) for row in rows if row.get("type") not in FIXED]
+    idle = sum(still) == 1 and still[0] and still[1:] and _unit(rows[1]) == "deg"
     convention = said or "standard"
     short = _short_lengths(path, rows, converted, as_printed, bool(length_unit or _calibrated(rows, convention)))
     _check_pairs_of_limits(path, given)
@@ -137,7 +135,31 @@ def read_dh_table(
     longest = max((abs(row[key]) for row in rows for key in ("a_mm", "d_mm")), default=0.0)
     if short or 0 < longest < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
-    return parse(RobotFile, content, path, AS_PRINTED if as_printed else None), tuple(notes)
+    found = parse(RobotFile, content, path, AS_PRINTED if as_printed else None)
+    way = said or _known_as(found)
+    if way == "modified" and not said:
+        form: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "as_printed": as_printed, "text": text}
+        other, assumed = read_dh_table(path, name, way, columns=columns, **form)
+        return other, (*assumed, "read as modified D-H: so it is a known arm's, as standard D-H none's")
+    if way is None and idle:
+        problem = "read as standard D-H, joints 1 and 2 turn about one line; read as modified D-H, none do"
+        remedy = "Write modified D-H or standard D-H above the table, or say it by --convention"
+        raise InputError(path, "convention", problem, remedy)
+    return found, tuple(notes)
+
+
+def _known_as(content: RobotFile) -> Convention | None:
+    """The convention in which alone a table's numbers are those of an arm of the catalogue, but for one; None if they
+    are in neither."""
+    from er3a.comparison.nearest import misfits
+    from er3a.files.arm_catalogue import known_arms
+    from er3a.files.robot_library import robot_of
+
+    robot = robot_of(content)
+    arms = [each.robot for each in known_arms().values() if np.array_equal(each.robot.sliding, robot.sliding)]
+    off = misfits(robot, arms).min(axis=1).tolist() if arms else [np.inf]
+    clear = min(off) < ONE_ENTRY and max(off) > min(off) + OTHERWISE
+    return CONVENTIONS[off.index(min(off))] if clear else None
 
 
 def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -> PrintedTable:

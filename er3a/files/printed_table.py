@@ -82,7 +82,7 @@ SIGNS = {
     "standard": re.compile(
         r"(?:standard|classic\w*)[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*standard|stddh|(?<![a-z])sdh(?![a-z])|标准|"
         r"[\"'](?:standard|classic|normal)[\"']|"
-        r"\b[ar](?:_?i)?\s*\*\s*(?:\w+\.)*(?:cos\([^\n,;*]{0,30}(?:th|θ|q)|ct\b)|"
+        r"\b[ar](?:_?i)?(?:\s*\*\s*(?:\w+\.)*(?:cos\([^\n,;*]{0,30}(?:th|θ|q)|ct\b)|\s*·?\s*\\?cos[\s(\\]{1,2}(?:th|θ|q))|"
         r"(?:cos\([^\n,;*]{0,30}(?:th|θ|q)[^\n,;*]{0,9}\)|\bct)\s*\*\s*(?:[\w\]]+\.)*[ar](?:_?i)?\b",
         re.I,
     ),
@@ -98,7 +98,7 @@ _GIVEN = re.compile(
     |\s+(?:and|und|et|y)\b                                          # a word,
     |(?<=[\w.°])\s+\((?:[^\W\d]{3,}[\s)]|[^()]*°\))                  # a remark in brackets,
     |\s+[^\W\d][\w{}]*[ \t]*=)                                      # or the next name
-    (?:[;,]?[ \t]*[%\#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?       # a comment that says the unit
+    (?:[;,]?[ \t]*[%\#]+[ \t]*[\[(]?(?:in[ \t]+)?(mm|cm|m|in(?![ \t]+\w))\b(?!\W*to\b))?  # a comment that says the unit
     """,
     re.VERBOSE,
 )
@@ -113,7 +113,7 @@ _SEVERAL = re.compile(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n
 _NAMED_SUM = re.compile(r"[-+*/]\s*(?![qθ]|th)[^\W\d]|(?![qθ]|th)[^\W\d]\w*\s*[-+*/]")
 """Arithmetic with a constant that has a name, as a drawing has it and no pose."""
 _IN_UNIT = re.compile(
-    r"\b(?:length|unit|distance|dimension|measure)[\w \"']*[^\n.;]{0,25}?(?:\bin\b|[:=(\[])[\s\"']{0,2}"
+    r"\b(?:length|unit|distance|dimension|measure)[\w \"']*[^.;]{0,25}?(?:\bin\b|[:=(\[])[\s\"']{0,2}"
     r"(mm|cm|m|inch|met(?:er|re)s?)\b",
     re.I,
 )

@@ -107,7 +107,8 @@ _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)
 def _matrix(code: Code, group: CodeGroup) -> Grid:
     """A matrix with the names of its columns; [] if it is none, or a pose."""
     rows = rows_of(code, group)
-    if len(rows) < 2 or any(re.match(r"[\[{]|\([^()]*,|.*:|-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for cell in rows[0][1]):
+    turning = any(re.match(r"-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for _, cells in rows for cell in cells)
+    if len(rows) < 2 or turning or any(re.match(r"[\[{]|\([^()]*,|.*:", cell) for cell in rows[0][1]):
         return []
     if len(rows) == 4 and re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):  # a pose
         return []

@@ -223,7 +223,9 @@ def exp_rotation(v: Reals) -> Reals:
     -------
     R : (..., 3, 3)
     """
-    R: Reals = scipy.spatial.transform.Rotation.from_rotvec(v.reshape(-1, 3)).as_matrix().reshape(*v.shape, 3)
+    share = np.linalg.norm(v, axis=-1)[..., None, None] / np.pi
+    K = skew(v)  # SciPy's class would take longer to import than an arm to compare
+    R: Reals = np.eye(3) + np.sinc(share) * K + np.sinc(share / 2) ** 2 / 2 * (K @ K)
     return R
 
 

@@ -349,16 +349,20 @@ def _forward(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
 def _forward_by_arrays(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
     """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow. No product is BLAS's,
     whose last bit depends on the number of threads."""
-    out[:] = links[0]
-    x, y, z, place = np.moveaxis(out, 2, 0)
+    turns = q.T * joint[_SIGN, :, None]
+    x, y, z, place = links[0, :3, :, None].swapaxes(0, 1)
+    cosines, sines = np.cos(turns + joint[_START, :, None]), np.sin(turns + joint[_START, :, None])
     for k, link in enumerate(links[1:]):
-        u = joint[_SIGN, k] * q[:, k, None]
         if joint[_SLIDES, k]:
-            place += u * z
+            place = place + turns[k] * z
         else:
-            cosine, sine = np.cos(u + joint[_START, k]), np.sin(u + joint[_START, k])
-            x[:], y[:] = cosine * x + sine * y, cosine * y - sine * x
-        out[:] = np.einsum("nij,jk->nik", out, link)
+            x, y = cosines[k] * x + sines[k] * y, cosines[k] * y - sines[k] * x
+        # Most entries of a link's transform are 0.
+        columns = (sum(own * each for own, each in zip(column, (x, y, z)) if own) for column in link[:3].T.tolist())
+        x, y, z, shift = columns
+        place = place + shift
+    for k, column in enumerate((x, y, z, place)):
+        out[:, :3, k] = column.T
     out[:, 3] = 0.0, 0.0, 0.0, 1.0
 
 

@@ -425,7 +425,9 @@ def test_rows_without_a_variable_are_base_and_flange_and_sliding_joints_keep_the
 
 def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
     values = "d1 = 0.38; a1 = 0; alpha1 = 0;\nd2 = 0; a2 = 0.35; alpha2 = -pi/2;\n"
-    content, _ = read(tmp_path, values + "M = [theta1 d1 a1 alpha1;\n     theta2-pi/2 d2 a2 alpha2];\n")
+    content, _ = read(
+        tmp_path, "% standard D-H\n" + values + "M = [theta1 d1 a1 alpha1;\n     theta2-pi/2 d2 a2 alpha2];\n"
+    )
     np.testing.assert_allclose(numbers(content), [(0, 0, 380, 0), (350, -90, 0, -90)])
 
 
@@ -958,13 +960,53 @@ CRAIG = "joint,a,alpha,d,theta\n1,0,0,333,q1\n2,0,-90,0,q2\n3,82,90,316,q3\n4,-8
 def test_a_convention_by_which_two_joints_turn_about_one_line_is_asked_back(tmp_path):
     path = tmp_path / "arm.csv"
     path.write_text(CRAIG)
-    with pytest.raises(InputError, match="joints 1 and 2 turn about one line"):
-        read_dh_table(path, "arm")
+    for as_printed in (False, True):
+        with pytest.raises(InputError, match="joints 1 and 2 turn about one line"):
+            read_dh_table(path, "arm", as_printed=as_printed)
     assert read_dh_table(path, "arm", "standard")[0].dh.convention == "standard"  # said, so it is meant
-    assert read_dh_table(path, "arm", as_printed=True)[0].dh.convention == "standard"  # a comparison names the other
     assert read(tmp_path, "Modified DH\n" + CRAIG)[0].dh.convention == "modified"
     # As modified rows joints 3 and 4 would turn about one line, too: nothing to choose between.
     assert read(tmp_path, CRAIG.replace("4,-82,90", "4,0,0"))[0].dh.convention == "standard"
+
+
+@pytest.mark.parametrize("modified", [False, True])
+def test_a_known_arm_settles_the_convention_that_its_table_does_not_say(tmp_path, modified):
+    """An arm of the catalogue in either convention, with one length that its source has otherwise."""
+    robot = er3a.load_robot("panda")
+    table = er3a.to_modified(robot) if modified else robot
+    columns = 1000 * table.a, np.degrees(table.alpha), 1000 * table.d + [5, 0, 0, 0, 0, 0, 0]
+    rows = [",".join(map(str, (k, *row, f"q{k}"))) for k, row in enumerate(zip(*columns), 1)]
+    content, _ = read(tmp_path, "joint,a,alpha,d,theta\n" + "\n".join(rows), name="arm.csv")
+    assert content.dh.convention == ("modified" if modified else "standard")
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "values"),
+    [
+        ("a = [0, 150, 825]\nalpha = [0, pi/2, 0]\nr = [550, 0, 0]\n# modified D-H\n", "d", [550, 0, 0]),  # Khalil's
+        ("double a_m[N] = {0.2, -0.8};\ndouble d_m[N] = {0.1, 0};\ndouble alpha[N] = {0, M_PI/2};", "a", [200, -800]),
+        (
+            "% standard D-H\na1 = 75; alpha1 = pi/2; d1 = 0; a2 = 650; alpha2 = 0; d2 = 0; a3 = 250;\n"
+            "T = A(a1, alpha1, d1, q(1)) * A(a2, alpha2, d2, q(2));",
+            "a",
+            [75, 650],
+        ),
+        (
+            "l1 = 300 # in the drawing\n# standard D-H: theta d a alpha\nM = [[q1, 0, l1, 90], [q2, 0, l1, 0]]\n",
+            "a",
+            [300] * 2,
+        ),
+        (
+            "% standard D-H\nDH = [0 -90 290 0; 270 0 0 -90];\na = DH(i,1);\nalpha = deg2rad(DH(i,2));\nd = DH(i,3);\n"
+            "theta = deg2rad(DH(i,4));\n",
+            "a",
+            [0, 270],
+        ),
+    ],
+)
+def test_lists_and_matrices_are_read_as_their_program_takes_them(tmp_path, text, quantity, values):
+    content, _ = read(tmp_path, text)
+    assert [getattr(row, f"{quantity}_mm") for row in content.dh.rows] == pytest.approx(values)
 
 
 @pytest.mark.parametrize(
@@ -1031,7 +1073,9 @@ def test_a_list_may_be_one_number_as_often_as_there_are_joints(tmp_path):
 
 
 def test_whole_numbers_say_nothing_of_inches(tmp_path):
-    content, _ = read(tmp_path, "% theta d a alpha\nM = [0 130 0 0;\n 0 0 sqrt(144^2 + 58^2) 0;\n 0 0 144 0];\n")
+    content, _ = read(
+        tmp_path, "% standard D-H: theta d a alpha\nM = [0 130 0 0;\n 0 0 sqrt(144^2 + 58^2) 0;\n 0 0 144 0];\n"
+    )
     assert content.dh.rows[0].d_mm == pytest.approx(130)
 
 
