@@ -519,8 +519,8 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     lower, upper = _range(path, where, element, notes) if kind in MOVING else (math.nan, math.nan)
     if kind == "continuous" and not math.isnan(lower):
         kind = "revolute" if max(-lower, upper) <= MAX_TURNED else kind
-        taken = "they are kept" if kind == "revolute" else "not kept, as they are no range of up to ten turns"
-        notes.append(f"is continuous with limits {lower:g} to {upper:g}: {taken}")
+        odd = f"not kept, as {lower:g} to {upper:g} is no range of up to ten turns"
+        notes.append(f"is continuous with limits: {'they are kept' if kind == 'revolute' else odd}")
     if kind == "revolute":
         lower, upper = math.radians(limit_in_degrees(lower, 1)), math.radians(limit_in_degrees(upper, -1))
     stated = (limit.get("velocity") or "inf") if limit is not None else "inf"
