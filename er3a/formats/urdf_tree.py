@@ -955,7 +955,8 @@ def _mesh(path: Path, where: str, shape: ElementTree.Element | None) -> tuple[Re
     name = shape.get("filename", shape.tag) if shape is not None else "nothing"
     if (file := mesh_of(path, name)) is None:
         problem = f"{name} is no file of a mesh that was found, nor a shape that is known"
-        raise InputError(path, where, problem, "Give a box, cylinder, sphere or mesh")
+        remedy = "Keep its package in a folder above the file, or give a box, cylinder or sphere"
+        raise InputError(path, where, problem, remedy)
     return read_link_mesh(file, numbers_of(path, where, shape, "scale", (1.0, 1.0, 1.0)))
 
 
