@@ -131,6 +131,8 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     have = {shape.link for own in shapes.values() for shape in own} - unread.intersection(dict(larger))
     seen = tuple(each for each in visuals if each.link not in have and not _is_marker(each))
     shapes["meshes"] += seen
+    # A link that reaches out of all shapes, and has none, is named by every verdict: the others' are the file's.
+    guessed = bool(seen) or not all((at := placed(name, False)) and at[1] in dict(larger) for name in lost)
     lost += tuple(link_label(each.link) for each in seen)
     names = tuple(joint.name for joint in sources)
     moving = [joint.name for joint in found.joints if joint.moves]
@@ -150,7 +152,7 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     more = {
         group: Source(
             f"As {path.name} states it{but.get(group, '')}",
-            "inferred" if lost and group == "envelopes" else "export",
+            "inferred" if guessed and group == "envelopes" else "export",
         )
         for group, there in stated.items()
         if there
