@@ -106,8 +106,11 @@ def test_a_damaged_surface_is_one_clear_error(imported, tmp_path):
         load_robot(tmp_path / "arm.yaml")
 
 
-def test_a_base_whose_mesh_is_missing_leaves_other_links_the_shapes_that_the_file_gives(tmp_path):
-    text = URDF.replace("visual", "collision").replace('<mesh filename="ball.stl"/>', '<box size="0.1 0.2 0.3"/>')
+@pytest.mark.parametrize("height", ["0.4", "0"])  # of joint one: as of a SCARA, whose table has no length for the base
+def test_a_base_whose_mesh_is_missing_leaves_other_links_the_shapes_that_the_file_gives(tmp_path, height):
+    text = URDF.replace('"0 0 0.4"', f'"0 0 {height}"').replace("visual", "collision")
+    text = text.replace('<collision><geometry><sphere radius="0.06"/></geometry></collision>', "")
+    text = text.replace('<mesh filename="ball.stl"/>', '<box size="0.1 0.2 0.3"/>')
     (tmp_path / "arm.urdf").write_text(text)
     imported = import_urdf(tmp_path / "arm.urdf")
     assert imported.robot.sources["envelopes"].grade == "export"
