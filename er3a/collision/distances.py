@@ -438,11 +438,18 @@ def _pair_motion(layout: Layout, T: Reals, w: Reals, k: int, half: Reals) -> flo
 
 @borrowing_kernel
 def _box_state(
-    layout: Layout, q: Reals, half: Reals, placed: tuple[Reals, Reals, Reals], room: Reals, near: Reals
+    layout: Layout,
+    q: Reals,
+    half: Reals,
+    depth: float,
+    placed: tuple[Reals, Reals, Reals],
+    room: Reals,
+    near: Reals,
 ) -> tuple[int, float]:
     """Of the joint vectors within ``half`` (n,) of one: FREE, MEETS if something overlaps in the one itself, UNDECIDED.
 
-    Besides, how far the bodies of a pair that is not proven apart move at most, m. ``placed`` is scratch.
+    Besides, how far the bodies of a pair that is not proven apart move at most, m; once that is more than ``depth``,
+    other pairs are only asked whether they overlap. ``placed`` is scratch.
     """
     T, w, middle = placed
     reach, first, second = layout.reach, layout.first, layout.second
@@ -452,7 +459,8 @@ def _box_state(
         moved = _pair_motion(layout, T, w, k, half)
         if _apart(middle, reach, first[k], second[k]) > moved:
             continue
-        distance, inside = pair_distance(layout, T, w, first[k], second[k], room, near, moved + BEYOND)
+        far = 0.0 if widest > depth else moved + BEYOND
+        distance, inside = pair_distance(layout, T, w, first[k], second[k], room, near, far)
         if inside or distance < 0:
             return MEETS, moved
         if distance <= moved:
@@ -484,7 +492,8 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
         height -= 1
         low, high = stack[height, 0], stack[height, 1]
         half = np.abs(end - start) * (high - low) / 2
-        state, widest = _box_state(layout, start + (end - start) * (low + high) / 2, half, placed, room, near)
+        middle = start + (end - start) * (low + high) / 2
+        state, widest = _box_state(layout, middle, half, depth, placed, room, near)
         looked += 1
         if state == MEETS:
             return MEETS, looked

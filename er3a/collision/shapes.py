@@ -163,10 +163,11 @@ def _covered(robot: Robot, shapes: ArmShapes, line: Reals, link: int) -> tuple[f
 
 def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> float:
     """How far (m) points of a link lie outside its shapes and those of its two neighbours: of what it looks like, and,
-    where it has no shape, along its lengths in the table; 0 for what may be a cover."""
+    where it has no shape, along its lengths in the table, of a base from its origin on; 0 for what may be a cover."""
     beside, none = {link - 1, link, link + 1}, np.empty((0, 3))
     seen = np.concatenate([none, *(visual.points for visual in robot.visuals if visual.link == link)])
     lines = [np.linspace(c.start, c.end, LINE_POINTS) for c in default_envelopes(robot) if c.link == link]
+    lines += [np.zeros((1, 3))] if link == BASE else []
     along = np.concatenate([none, *(lines if link in shapes.bare else [])])
     most = 0.0
     for points, by in ((along, TOUCH), (seen, VISIBLE)):

@@ -23,7 +23,7 @@ from er3a.robots.robot import Robot, Source
 
 ROUNDED_RAD = 2e-3  # half a turn written as 3.14
 SEVERAL = 3  # joints or links, that no maker's arm has alike
-THOUSAND = 1000.0  # N m, of no motor that is known so roundly; generators of URDFs write it
+THOUSAND = 1000.0  # N m: of no motors that are known in whole ones; generators of URDFs write them
 OUTSIDE_M = 0.25  # m, beyond all that is drawn of a link: more than what is glued to it without a shape explains
 
 
@@ -67,7 +67,8 @@ def _no_efforts(robot: Robot) -> str:
     peak = np.empty(0) if robot.masses.drives is None else robot.masses.drives.peak
     if _alike(peak):
         return f"all joints have the effort {np.nanmax(peak):g}"
-    return f"joints have the effort {THOUSAND:g}" if (peak == THOUSAND).sum() >= SEVERAL else ""
+    round_ = peak[(peak > 0) & (peak % THOUSAND == 0)]
+    return f"joints have efforts such as {round_[0]:g}" if len(round_) >= SEVERAL else ""
 
 
 def _alike(values: Reals) -> bool:
@@ -80,8 +81,10 @@ def _no_masses(robot: Robot) -> str:
     """Why masses are none; empty if they may be meant."""
     links = [each for each in robot.masses.links if each.link]  # what the base weighs moves nothing
     masses = [each.body.mass for each in links]
-    if len(masses) >= SEVERAL and np.ptp(masses) == 0:
-        return f"all links have the mass {masses[0]:g} kg"
+    least = min(masses, default=math.nan)
+    # Of links that are fixed to each other, each has it, and they count as one.
+    if masses.count(least) >= SEVERAL and not np.mod(np.round(np.divide(masses, least), 6), 1).any():
+        return f"all links have the mass {least:g} kg"
     moments = [np.linalg.eigvalsh(each.body.inertia_matrix) for each in links]
     if len(moments) >= SEVERAL and np.allclose(moments, moments[0][0]):
         return f"all links have the moment of inertia {moments[0][0]:g} kg m2 about each axis"

@@ -45,7 +45,7 @@ MANY_TURNS = 4 * math.pi + 0.01
 FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
 WRITTEN_RAD = 1e-9  # angles that differ by less are the same, written in all digits of a double
-SHOWN_MM = 1e-4  # that a point of the flange moves by; no controller shows less
+SHOWN_MM = 0.02  # that a point of the flange moves by; no arm repeats a pose better
 MARKER_M = 2e-3  # across; a PR2 has cubes of 1 mm where frames are, a Magician one of 0.1 mm
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
@@ -125,12 +125,14 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     misfit = np.linalg.norm((forward(robot, q) - _chain_forward(found.joints, values))[:, :3, 3], axis=1).max()
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
     shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
-    visuals, unseen = link_visuals(path, root, robot, placed)
+    visuals, unseen = link_visuals(path, root, robot, placed, lost)
     unread = {at[1] for name in lost if (at := placed(name, False))}
     larger = arm_shapes(robot.replace(**shapes, visuals=visuals)).uncovered if unread else ()
     have = {shape.link for own in shapes.values() for shape in own} - unread.intersection(dict(larger))
     seen = tuple(each for each in visuals if each.link not in have and not _is_marker(each))
     shapes["meshes"] += seen
+    # A link that reaches out of all shapes, and has none, is named by every verdict: the others' are the file's.
+    guessed = bool(seen) or not all((at := placed(name, False)) and at[1] in dict(larger) for name in lost)
     lost += tuple(link_label(each.link) for each in seen)
     names = tuple(joint.name for joint in sources)
     moving = [joint.name for joint in found.joints if joint.moves]
@@ -150,7 +152,7 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     more = {
         group: Source(
             f"As {path.name} states it{but.get(group, '')}",
-            "inferred" if lost and group == "envelopes" else "export",
+            "inferred" if guessed and group == "envelopes" else "export",
         )
         for group, there in stated.items()
         if there
@@ -330,7 +332,7 @@ def link_shapes(
         "meshes": tuple(link_mesh(number, np.concatenate(parts)) for number, parts in surfaces.items()),
     }
     left_out = f"shapes of {', '.join(unread)} are left out"
-    notes = [f"{left_out} ({why}); such links count as they look" for why in unread.values()][:1]
+    notes = [f"{left_out} ({why}); such links count as they look, if they are drawn" for why in unread.values()][:1]
     if astray:
         notes.append(f"shapes of {urdf_tree.some(astray)} are left out: they do not move with the arm's chain")
     return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
@@ -349,7 +351,11 @@ def _said(path: Path, error: Er3aError) -> str:
 
 
 def link_visuals(
-    path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces
+    path: Path,
+    root: ElementTree.Element,
+    robot: Robot,
+    placed: urdf_tree.LinkPlaces,
+    lost: Collection[str] = (),
 ) -> tuple[tuple[LinkMesh, ...], tuple[str, ...]]:
     """The visual geometry of a URDF, for pictures, in the frames of the links of the robot made from it.
 
@@ -357,6 +363,7 @@ def link_visuals(
     ----------
     path : of the URDF, from which meshes are looked for
     placed : where the links are with all joints of the robot at 0
+    lost : links of which a note says already that something can't be read
 
     Returns
     -------
@@ -373,7 +380,8 @@ def link_visuals(
             try:
                 points, faces = urdf_tree.visual_surface(path, name, visual)
             except Er3aError as error:
-                missing.setdefault(name, _said(path, error))
+                if name not in lost:
+                    missing.setdefault(name, _said(path, error))
                 continue
             parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3])[faces])
     found = []

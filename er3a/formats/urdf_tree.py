@@ -519,8 +519,8 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     lower, upper = _range(path, where, element, notes) if kind in MOVING else (math.nan, math.nan)
     if kind == "continuous" and not math.isnan(lower):
         kind = "revolute" if max(-lower, upper) <= MAX_TURNED else kind
-        taken = "they are kept" if kind == "revolute" else "not kept, as they are no range of up to ten turns"
-        notes.append(f"is continuous with limits {lower:g} to {upper:g}: {taken}")
+        odd = f"not kept, as {lower:g} to {upper:g} is no range of up to ten turns"
+        notes.append(f"is continuous with limits: {'they are kept' if kind == 'revolute' else odd}")
     if kind == "revolute":
         lower, upper = math.radians(limit_in_degrees(lower, 1)), math.radians(limit_in_degrees(upper, -1))
     stated = (limit.get("velocity") or "inf") if limit is not None else "inf"
@@ -955,7 +955,8 @@ def _mesh(path: Path, where: str, shape: ElementTree.Element | None) -> tuple[Re
     name = shape.get("filename", shape.tag) if shape is not None else "nothing"
     if (file := mesh_of(path, name)) is None:
         problem = f"{name} is no file of a mesh that was found, nor a shape that is known"
-        raise InputError(path, where, problem, "Give a box, cylinder, sphere or mesh")
+        remedy = "Keep its package in a folder above the file, or give a box, cylinder or sphere"
+        raise InputError(path, where, problem, remedy)
     return read_link_mesh(file, numbers_of(path, where, shape, "scale", (1.0, 1.0, 1.0)))
 
 

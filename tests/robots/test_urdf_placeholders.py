@@ -51,7 +51,17 @@ def test_masses_that_are_none_are_left_out(tmp_path, given):
     assert "no torque is judged" in imported.notes[0]
 
 
-@pytest.mark.parametrize("effort", ["300", "1000", "0"])
+def test_a_flange_with_the_mass_that_each_link_has_hides_no_placeholder(tmp_path):
+    path = written(tmp_path, mass="0.1")
+    body = '<inertial><mass value="0.1"/><inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial>'
+    ends = f'<link name="f">{body}</link><joint name="m" type="fixed"><parent link="l4"/><child link="f"/></joint>'
+    path.write_text(path.read_text().replace("</robot>", f"{ends}</robot>"))
+    imported = import_urdf(path)
+    assert not imported.robot.masses.links
+    assert "all links have the mass 0.1 kg" in imported.notes[0]
+
+
+@pytest.mark.parametrize("effort", ["300", "1000", "{k}000", "0"])
 def test_efforts_that_are_none_are_unknown(tmp_path, effort):
     robot = import_urdf(written(tmp_path, effort=effort)).robot
     assert robot.masses.drives is None

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from er3a.collision.meshes import simplified
+from er3a.collision.shapes import arm_shapes
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
@@ -103,3 +104,18 @@ def test_a_damaged_surface_is_one_clear_error(imported, tmp_path):
     own.unlink()
     with pytest.raises(InputError, match=rf"{own.name}: can't be read"):
         load_robot(tmp_path / "arm.yaml")
+
+
+@pytest.mark.parametrize("height", ["0.4", "0"])  # of joint one: as of a SCARA, whose table has no length for the base
+def test_a_base_whose_mesh_is_missing_leaves_other_links_the_shapes_that_the_file_gives(tmp_path, height):
+    text = URDF.replace('"0 0 0.4"', f'"0 0 {height}"').replace("visual", "collision")
+    text = text.replace('<collision><geometry><sphere radius="0.06"/></geometry></collision>', "")
+    text = text.replace('<mesh filename="ball.stl"/>', '<box size="0.1 0.2 0.3"/>')
+    (tmp_path / "arm.urdf").write_text(text)
+    imported = import_urdf(tmp_path / "arm.urdf")
+    assert imported.robot.sources["envelopes"].grade == "export"
+    assert [link for link, _ in arm_shapes(imported.robot).uncovered] == [0]
+    assert sum("lost.stl" in note for note in imported.notes) == 1
+    drawn = text.replace("</link>", "<visual><geometry><mesh filename='lost.stl'/></geometry></visual></link>", 1)
+    (tmp_path / "arm.urdf").write_text(drawn)
+    assert sum("lost.stl" in note for note in import_urdf(tmp_path / "arm.urdf").notes) == 1

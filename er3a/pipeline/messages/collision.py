@@ -79,7 +79,7 @@ TEXTS = texts(
             "[Targets that collide in every solution: {blocked:3, }.][{targets:?} Targets solved: {targets}; the "
             "nearest is clear by {nearest}.][ Paths that collide: {colliding:, }.] {free_ratio:.1%} of the joint "
             "space is collision-free. Of {places} cells {clear} are reached without collision.[ From home: "
-            "{joined}.][{undecided:?} Pairs undecided, and therefore checked: {undecided}.]"
+            "{joined}.]"
         ),
         "nearest_target": "{clearance_mm:.1f} mm ({name}, {pair})",
         "colliding": "{name} ({pair}[; as expected{expected:?}])",

@@ -177,9 +177,8 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     )
     closest = (*at_targets, *on_paths)
     assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
-    undecided = int((matrix.state == "undecided").sum())
     free = _free_space(space, places_found, at_targets, blocked, _colliding(motions, on_paths, first_touch)).but(
-        undecided=undecided, shapes_assumed=assumed is not None
+        shapes_assumed=assumed is not None
     )
     covered = covered_collisions(robot, bodies, scene)
     home = None

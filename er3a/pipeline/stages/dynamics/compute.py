@@ -508,13 +508,15 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         motors=motors,
         uses=uses,
         power_imbalance=max(imbalances, default=None),
-        checked=_checked(paths, rest, settings),
+        checked=_checked(paths, rest, settings) if moving else (),
         assumed=(
             *(each for each in rest if each.reason not in GAPS),
             *_mounting(study, name),
             *(() if study.scene(name, "trajectory") or not paths else (Open("open_space"),)),
             *unknown,
-        ),
+        )
+        if moving or uses
+        else (),
     )
     followed = [path.rows for path in paths if path.demand]
     rows = model.TorqueRows.stacked(followed).of_joints(robot.slides)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.pairs import TRIED
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
@@ -53,7 +52,6 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         answer,
         matrix=_matrix(robot, results.matrix),
         never_met=int((results.matrix.state == "never").sum()),
-        tried=TRIED,
         player=player(
             robot,
             [*motions(robot, results, ends), *poses(robot, results)] or [at_rest(robot, own_title(robot.title))],
