@@ -68,7 +68,7 @@ GAP_WORDS: Mapping[str, str] = words(
 ASSUMED: Mapping[str, str] = words(
     {
         "own_values": "values of the robot's file that are inferred",
-        "own_speeds": "limits of joint speeds: begin at 10 % override",
+        "own_speeds": "limits of joint speeds (once they are confirmed, begin at 10 % override)",
         "own_accelerations": "limits of joint accelerations",
         "tool": "no tool: the flange's centre is the tip",
         "carried": "nothing is carried",

@@ -45,7 +45,7 @@ def _(results: ValidationResults) -> Glance:
     counts, evidence = summary.counts.independent, summary.evidence
     value = f"{counts.passed}/{counts.total}" if counts.total else "0"
     if summary.verdict.status == "fail":
-        bad = evidence.contradicted if evidence else 0
+        bad, value = evidence.contradicted if evidence else 0, f"{counts.total - counts.passed}/{counts.total}"
         return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
     for conflict in summary.conflicts[:1]:
         stated = [each.expected for each in conflict.statements]
@@ -58,7 +58,9 @@ def _(results: ValidationResults) -> Glance:
 def _(results: WorkspaceResults) -> Glance:
     summary = results.summary
     far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
-    sizes = [about(void) for void in summary.voids if void.holds_shoulder]
+    sizes = [about(void) for void in summary.voids]
+    if len(sizes) > 1:
+        return far, tr("{count} voids", count=len(sizes))
     return far, tr("void {size}", size=sizes[0]) if sizes else with_unit(fixed(summary.volume_m3.middle, 2), "m³")
 
 

@@ -8,7 +8,6 @@ from typing import Any
 from er3a.by_value import frozen
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.dynamics import payload_key
-from er3a.pipeline.messages.say import joined
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import ProgramsResults
@@ -31,19 +30,19 @@ LETTERS = 0.14  # of the reach, in the small view from above
 class Tile:
     """An answer, which leads to its page, and its picture.
 
-    ``asked``: what it answers, by ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``,
+    ``asked``: what it answers, by ``answer``, in the colour of ``mark``, and what is ``good``. ``entries``,
     the first ``rows`` of ``all`` below a ``heading``, ``drawing`` with ``keys``: what is shown, one of them.
     """
 
     asked: str
     answer: str
-    rest: str
     mark: Mark
     address: str
     entries: Mapping[str, Any] | None = None
     rows: Sequence[ListRow] = ()
     all: int = 0
     heading: str = ""
+    good: Sequence[ListRow] = ()
     drawing: str = ""
     keys: Sequence[tuple[str, str]] = ()
 
@@ -66,13 +65,13 @@ def table_tile(name: str, stored: Results) -> Tile | None:
     evidence = results.summary.evidence
     bad = evidence.contradicted
     answer = (
-        tr("{count} of {all} contradicted: given → right.", count=bad, all=known_alone(evidence))
+        tr("{count} of {all} contradicted: given → instead.", count=bad, all=known_alone(evidence))
         if bad
         else tr("{count} numbers not settled", count=len(evidence.unconfirmed))
     )
     mark: Mark = "fail" if bad else "caution" if evidence.unconfirmed else "pass"
     entries = evidence_section(evidence)
-    return Tile(tr("Which numbers are wrong?"), answer, "", mark, f"{name}/validation.html", entries)
+    return Tile(tr("Which numbers are wrong?"), answer, mark, f"{name}/validation.html", entries)
 
 
 def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
@@ -88,11 +87,11 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     said = answer(study.robot(name), results)
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
-    good = joined([row.name for row in rows if row.mark == "pass"], ", ")
+    good = [row for row in rows if row.mark == "pass" and row.play]
     others = [row for row in rows if row.mark != "pass"]
     page = f"{name}/{found.stage}.html"
     asked = tr("In the model: {what}", what=what)
-    return Tile(asked, said.headline, good, sound, page, rows=others[:FEW], all=len(others), heading=said.rest)
+    return Tile(asked, said.headline, sound, page, rows=others[:FEW], all=len(others), heading=said.rest, good=good)
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
@@ -105,4 +104,4 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     voids = [(about(void), if_normal(void, void_name(k, void))) for k, void in enumerate(results.summary.voids, 1)]
     keys, page = [payload_key(known, robot), *voids[:2]], f"{name}/workspace.html"
-    return Tile(tr("Where the tray goes"), placing.tray.place_text, "", "pass", page, drawing=drawing, keys=keys)
+    return Tile(tr("Where the tray goes"), placing.tray.place_text, "pass", page, drawing=drawing, keys=keys)

@@ -26,6 +26,7 @@ from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
+FEW = 0.01  # of the longest bar: what holds less is not listed
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
@@ -155,13 +156,17 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     most = max(most, *(each.peak + _moment_of(results, each)[2] for each in summary.motors)) or 1.0
     step = 10.0 ** np.floor(np.log10(most))
     scale = float(step * np.ceil(most / step))  # of all bars without a limit of their own
+    some = any(motor.peak_limit is not None for motor in order)
     rows, still = [], []
     for motor in order:
         path, t, off = _moment_of(results, motor)
         title = joined([f"J{motor.joint}", path], ", ")
-        rows.append(_row(motor, (motor.peak, off), title, (path, t), scale, motor.peak_limit))
+        rows.append(_row(motor, (motor.peak, off), title, (path, t), scale, motor.peak_limit if some else 0.0))
         name, held = holding_name(motor.joint), summary.holding[motor.joint - 1]
-        still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), scale))
+        if motor.holding + held.tolerance >= FEW * scale:
+            still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), scale))
+    moving = tr("Greatest torque on the paths") if some else tr("Greatest torque on the paths; limits unknown")
+    bars, few = (with_unit(f"{share * scale:g}", worst.unit) for share in (1.0, FEW))
     left = [
         tr(WITHOUT[each.reason], links=joined(each.names, " + ")) for each in summary.assumed if each.reason in WITHOUT
     ]
@@ -174,11 +179,8 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         [
             Group(title, found, counted=False)
             for title, found in (
-                (tr("Greatest torque on the paths"), rows),
-                (
-                    tr("Holding; bars to {most}", most=with_unit(f"{scale:g}", worst.unit)),
-                    still,
-                ),
+                (moving, rows),
+                (tr("Holding at least {few}; bars to {most}", few=few, most=bars), still),
             )
         ],
         None if limited else Fix(todo, "#drives", False),

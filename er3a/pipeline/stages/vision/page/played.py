@@ -78,7 +78,7 @@ def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Real
     text = tr("Can be grasped here")
     if each.error_mm:
         off = fixed(each.error_mm.together, 1)
-        text = tr("Grasp: {off} mm off, {allowed:g} mm allowed", off=off, allowed=allowed_mm)
+        text = tr("Grasp: 95 % within {off} mm, {allowed:g} mm allowed", off=off, allowed=allowed_mm)
     there = grasp_moment(results, each)[1]
     events.append(PlayedEvent(there, there, text, "plain"))
     return PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events)

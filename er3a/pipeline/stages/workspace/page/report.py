@@ -93,7 +93,8 @@ def _answer(
         payload,
     ]
     groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
-    return Answer(joined(said, " "), "", tr("Distances are from axis 1."), keys, groups, fix)
+    frames = tr("Reach is from axis 1; the tray's centre in mm in the base's frame; its stand from the floor.")
+    return Answer(joined(said, " "), "", frames, keys, groups, fix)
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
