@@ -166,7 +166,7 @@ def _cell(verdict: StageVerdict, heads: Mapping[str, Head], stored: Results) -> 
     value, note = glance(stored[stage].results)
     if verdict.said_by:
         note = tr("see {stages}", stages=tr(PAGES[verdict.said_by]))
-    return StageCell(stage, head.sign.split()[0], value, note, head.text)
+    return StageCell(stage, head.sign, value, note, head.text)
 
 
 def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:

@@ -206,15 +206,13 @@ class Head:
 
     @property
     def sign(self) -> str:
-        """The classes of its mark, the same on every page: a pass with what is expected to fail has its own; one that
-        rests on a table of which documents settle nothing is a caution."""
+        """The class of its mark, the same on every page: a pass that rests on a table of which documents settle nothing
+        is a caution."""
         if self.no_verdict:
             return "no_verdict"
         if self.status != "pass":  # a table about which documents disagree is worse than one of which part is open
             return "conflict" if self.status == "caution" and getattr(self.summary, "conflicts", None) else self.status
-        if self.table == "unsettled":
-            return "caution"
-        return "pass as_meant" if self.finding.params.get("demonstrations") else "pass"
+        return "caution" if self.table == "unsettled" else "pass"
 
     @property
     def finding(self) -> Any:
