@@ -165,7 +165,6 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         name, held = holding_name(motor.joint), summary.holding[motor.joint - 1]
         if motor.holding + held.tolerance >= FEW * scale:
             still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), scale))
-    moving = tr("Greatest torque on the paths") if some else tr("Greatest torque on the paths; limits unknown")
     bars, few = (with_unit(f"{share * scale:g}", worst.unit) for share in (1.0, FEW))
     left = [
         tr(WITHOUT[each.reason], links=joined(each.names, " + ")) for each in summary.assumed if each.reason in WITHOUT
@@ -179,7 +178,7 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         [
             Group(title, found, counted=False)
             for title, found in (
-                (moving, rows),
+                (tr("Greatest torque on the paths"), rows),
                 (tr("Holding at least {few}; bars to {most}", few=few, most=bars), still),
             )
         ],
