@@ -14,7 +14,7 @@ from er3a.calibration.observations import Measurement
 from er3a.calibration.terms import starting_table
 from er3a.finding import is_one, plain
 from er3a.pipeline.language import as_text, tr, words
-from er3a.pipeline.messages.say import joined, listed, say, texts
+from er3a.pipeline.messages.say import joined, listed, say
 from er3a.robots.robot import Robot
 
 RECORDED = (
@@ -40,22 +40,6 @@ VERDICTS = words(
         "not_lower": "left: poses left out are not met better",
         "noise": "left: noise may have made it",
         "wrong_way": "left: a load would have to lift the arm",
-    }
-)
-TEXTS = texts(
-    {
-        "held_back_all_fitted": "All positions held back are at fitted poses and test nothing. Hold others back.",
-        "held_back_fitted": (
-            "{count} positions held back are at fitted poses and test nothing. Take them out of one of the files."
-        ),
-        "held_back_contradict": (
-            "{count} positions held back contradict the calibration: {mean_mm:.3g} mm off on average, poses left out "
-            "{usual_mm:.3g} mm. Check that both files have the same frame, tool point and units."
-        ),
-        "held_back_elsewhere": (
-            "{count} positions beyond the fitted joint values are {mean_mm:.3g} mm off on average, poses left out "
-            "{usual_mm:.3g} mm. Measure there, too."
-        ),
     }
 )
 

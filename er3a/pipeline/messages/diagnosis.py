@@ -99,6 +99,18 @@ TEXTS = texts(
             "no corrections fit: after {steps} steps {rest_mm:.3g} mm stay. Check whose table it is, and which joints "
             "belong to which point; er3a confirm names what is other"
         ),
+        "held_back_all_fitted": "All positions held back are at fitted poses and test nothing. Hold others back.",
+        "held_back_fitted": (
+            "{count} positions held back are at fitted poses and test nothing. Take them out of one of the files."
+        ),
+        "held_back_contradict": (
+            "{count} positions held back contradict the calibration: {mean_mm:.3g} mm off on average, poses left out "
+            "{usual_mm:.3g} mm. Check that both files have the same frame, tool point and units."
+        ),
+        "held_back_elsewhere": (
+            "{count} positions beyond the fitted joint values are {mean_mm:.3g} mm off on average, poses left out "
+            "{usual_mm:.3g} mm. Measure there, too."
+        ),
         "corrections_found": "Corrections found, with 95 % intervals that exclude 0: {entries:, }.",
         "no_correction_found": (
             "95 % intervals that exclude 0: none of {intervals}.[ Not determined by these positions: {open:, }.]"

@@ -93,7 +93,7 @@ def _answer(
         payload,
     ]
     groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
-    frames = tr("Reach is from axis 1; the tray's centre in mm in the base's frame; its stand from the floor.")
+    frames = tr("Reach from axis 1, tray's centre in base frame.")
     return Answer(joined(said, " "), "", frames, keys, groups, fix)
 
 
