@@ -36,11 +36,12 @@ function placeOf({ points, shapes }) {
   return points ? points.reduce((a, b) => (b[2] > a[2] ? b : a)) : add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
 }
 
-const aboutAxis = (at) => Math.hypot(...subtract(at, middle).slice(0, 2)) < 0.1 * size[0];
 /** Turns the picture until what is chosen is before the rest: a tray from its side, with the arm in it. */
-function face() {
+function face(chosen) {
+  shown = chosen;
   const at = placeOf(shown);
-  const [[x, y], near, about] = [subtract(at, middle), Boolean(shown.shapes), aboutAxis(at)];
+  const [[x, y], near] = [subtract(at, middle), Boolean(shown.shapes)];
+  const about = Math.hypot(x, y) < 0.1 * size[0]; // axis 1
   Object.assign(space, { azimuth: about ? data.azimuth : Math.atan2(y, x) + (near ? 0.9 : 0.35), elevation: 0.35, distance: (near || about ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
   refresh();
 }
@@ -129,9 +130,6 @@ for (const each of unlisted) {
 }
 
 knife.addEventListener("input", refresh);
-addEventListener("hashchange", () => {
-  shown = asked() ?? shown;
-  if (asked()) face();
-});
-(shown ? face : refresh)();
+addEventListener("hashchange", () => asked() && face(asked()));
+shown ? face(shown) : refresh();
 performance.mark("turning");
