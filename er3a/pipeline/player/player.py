@@ -38,8 +38,9 @@ _HERE = Path(__file__).parent
 TEACH, VIEWING = _HERE.with_name("teach"), _HERE.with_name("viewing")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
-MARGIN = 0.12  # of the arm's size, around what is to be seen: links are thick
-AROUND = 0.1  # of the arm's size, from its way: what bodies have farther off need not be in the picture
+MARGIN, THICK = 0.04, 0.08  # of the arm's size, around what is to be seen, and around the middle of links
+TITLE = 0.05  # of the picture's height, for what is said over it
+AROUND = 0.3  # of the arm's size, from its way: what bodies have farther off need not be in the picture
 TURNED = 0.25  # rad, by which the eye looks at arms along y from another side
 TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which the arm is seen best
 HIDDEN_COSTS, TURN_COSTS = 1.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
@@ -186,17 +187,26 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, 
     arms, size = np.concatenate(points), data["size"]
     low, high = arms.min(axis=0), arms.max(axis=0)
     bodies = [each for each in data["scene"] if not each.get("large") and each.get("pale") is not True]
-    points += [_corners(each).clip(low - AROUND * size, high + AROUND * size) for each in bodies]
+    points += [
+        corners if "own" in each else corners.clip(low - AROUND * size, high + AROUND * size)
+        for each, corners in zip(bodies, map(_corners, bodies))
+    ]  # a camera's field is held whole
     points += [np.clip([mark.start], low - size, high + size) for mark in motion.marks]
     axes = axes_of(AZIMUTH + turned, motion.elevation)
-    across = np.concatenate(points) @ axes.T
+    thick = THICK * size * axes[:2].sum(axis=0)
+    across = np.concatenate([arms - thick, arms + thick, *points]) @ axes.T
     middle = (across.min(axis=0) + across.max(axis=0)) / 2
     across -= middle
-    length = data["size"]
+    length = size
     for _ in range(4):  # what is nearer is larger
         nearer = DISTANCE * length / (DISTANCE * length + across[:, 2])
-        width, height, _ = np.abs(across * nearer[:, None]).max(axis=0) + MARGIN * data["size"]
-        length = 2 * FIELD / DISTANCE * max(width / WIDE, height)
+        seen = across[:, :2] * nearer[:, None]
+        shift = (seen.min(axis=0) + seen.max(axis=0)) / 2
+        middle[:2] += shift
+        across[:, :2] -= shift
+        width, height = np.ptp(seen, axis=0) / 2 + MARGIN * size
+        length = 2 * FIELD / DISTANCE * max(width / WIDE, height / (1 - TITLE))
+    middle[1] -= TITLE * height  # upwards
     return {"length": float(length), "target": (middle @ axes).tolist()}
 
 
@@ -210,7 +220,7 @@ def best_turn(robot: Robot, motion: PlayedMotion, t: float, data: dict[str, Any]
     gaps = [np.subtract(mark.end, mark.start) for mark in motion.marks if mark.t0 <= t <= mark.t1 and mark.text]
     if any(event.status == "fail" and event.t <= t <= event.until for event in motion.events):
         gaps = []  # what is inside is seen from no side
-    margin = MARGIN * data["size"] / 2
+    margin = (MARGIN + THICK) * data["size"] / 2
     whole = np.linalg.norm(np.diff(joints, axis=1), axis=2).sum()
     best = []
     for turn in TURNS:

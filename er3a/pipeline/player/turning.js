@@ -28,19 +28,20 @@ Object.assign(space, { azimuth: data.azimuth, elevation: data.elevation });
 
 const all = [...layers, ...solids];
 const unlisted = all.filter(({ address }) => !address);
-const chosen = () => all.find(({ address }) => address && address === location.hash.slice(1));
-const first = all.find(({ address }) => address === "tray-1");
+const asked = () => all.find(({ address }) => address && address === location.hash.slice(1));
+let shown = asked() ?? all.find(({ address }) => address === "tray-1"); // the row that the list marks
 
 /** The highest point of a layer, or the top of solids. */
 function placeOf({ points, shapes }) {
   return points ? points.reduce((a, b) => (b[2] > a[2] ? b : a)) : add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
 }
 
-const aboutAxis = (at) => Math.hypot(...subtract(at, middle).slice(0, 2)) < 0.1 * size[0];
-/** Turns the picture until what the address names is before the rest: a tray from its side, with the arm in it. */
-function face() {
-  const at = placeOf(chosen());
-  const [[x, y], near, about] = [subtract(at, middle), Boolean(chosen().shapes), aboutAxis(at)];
+/** Turns the picture until what is chosen is before the rest: a tray from its side, with the arm in it. */
+function face(chosen) {
+  shown = chosen;
+  const at = placeOf(shown);
+  const [[x, y], near] = [subtract(at, middle), Boolean(shown.shapes)];
+  const about = Math.hypot(x, y) < 0.1 * size[0]; // axis 1
   Object.assign(space, { azimuth: about ? data.azimuth : Math.atan2(y, x) + (near ? 0.9 : 0.35), elevation: 0.35, distance: (near || about ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
   refresh();
 }
@@ -96,8 +97,8 @@ function draw() {
   plane.constant = -low[1] - Number(knife.value) * size[1];
   space.begin();
   space.floor(middle, size[0] / FLOOR, data.floor);
-  const [shown, near] = [chosen(), chosen()?.shapes];
-  const isSeen = (each) => each.check?.checked ?? (each.shapes ? !shown?.points && each === (near ? shown : first) : !near);
+  const near = shown?.shapes;
+  const isSeen = (each) => each.check?.checked ?? (each.shapes ? each === shown : !near);
   const arm = near && shown.reached.length ? shown.reached : solids[0].poses;
   for (const each of all) for (const part of each.parts) part.visible = isSeen(each);
   for (const { material } of layers.flatMap(({ parts }) => parts)) material.opacity = (material.userData.opacity ??= material.opacity) * (near ? AWAY : 1);
@@ -108,12 +109,12 @@ function draw() {
   const named = all.filter((each) => each.address && isSeen(each));
   space.keepClear(alongArm(arm), ARM * size[0]);
   for (const each of named) space.keepClear(each.points?.filter((_, i) => i % SPARSE === 0) ?? [placeOf(each)], each.points ? 0 : ARM * size[0]);
-  for (const [from, to, text] of shown ? (shown.ways ?? []) : solids[0].ways) {
+  for (const [from, to, text] of (near ? shown : solids[0]).ways) {
     space.line([from, to], space.page.accent, 3);
     space.keepClear([...Array(21).keys()].map((i) => add(scaled(from, 1 - i / 20), scaled(to, i / 20))), 0);
-    space.word(text, add(scaled(from, 0.4), scaled(to, 0.6)), space.page.accent, Boolean(shown) || !space.small);
+    space.word(text, add(scaled(from, 0.4), scaled(to, 0.6)), space.page.accent, Boolean(near) || !space.small);
   }
-  for (const each of named) space.word(each.name, each.points?.reduce((a, b) => (dot(eyeOf(space).back, subtract(b, a)) > 0 ? b : a)) ?? placeOf(each), space.page[each.points ? "hole" : each === shown ? "accent" : "ink"]);
+  for (const each of named) space.word(each.name, each.points?.reduce((a, b) => (dot(eyeOf(space).back, subtract(b, a)) > 0 ? b : a)) ?? placeOf(each), space.page[each.points ? "hole" : "accent"]);
   for (const each of solids.slice(1).filter((each) => !each.address && isSeen(each) && !space.small)) space.names(each.parts);
   space.end();
   place.toggleAttribute("data-drawn", true);
@@ -129,6 +130,6 @@ for (const each of unlisted) {
 }
 
 knife.addEventListener("input", refresh);
-addEventListener("hashchange", () => chosen() && face());
-(chosen() ? face : refresh)();
+addEventListener("hashchange", () => asked() && face(asked()));
+shown ? face(shown) : refresh();
 performance.mark("turning");

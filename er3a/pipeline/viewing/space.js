@@ -14,7 +14,12 @@ const MAX_PIXELS = 1.6e6; // more can't be painted often enough without a graphi
 const GRID_STEPS = 8; // lines of the floor on each side of the base
 const PALE = 0.36;
 const SMALL = 0.12; // radius of a body that its name would hide, in parts of what is seen
-const HIDDEN = 0.22; // of a line, where a body is before it
+// Lines behind bodies are faint; those of the floor are under all: they don't cross an arm below it.
+const LINES = {
+  hidden: { order: 1, style: { depthTest: false, transparent: true, opacity: 0.22 } },
+  seen: { order: 0, style: {} },
+  under: { order: -1, style: { depthWrite: false } },
+};
 const CREASE = 0.7; // rad between two faces: less is drawn as one that is curved
 // Where a word may be, in its widths and heights from its point.
 const PLACES = [0, -0.5, 0.5, -1, 1, -1.5, 1.5, -2, 2, -2.5, 2.5].flatMap((i) => [0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6].map((j) => [i, j]));
@@ -119,7 +124,7 @@ export class Space extends Orbit {
     const ends = Array.from({ length: 2 * GRID_STEPS + 1 }, (_, i) => (i - GRID_STEPS) * step).flatMap((at) => [
       [at, -half], [at, half], [-half, at], [half, at],
     ]);
-    this.segments(ends.flatMap(([x, y]) => [centre[0] + x, centre[1] + y, z]), this.page.grid, 1, false);
+    this.segments(ends.flatMap(([x, y]) => [centre[0] + x, centre[1] + y, z]), this.page.grid, 1, ["under"]);
     if (this.ground) return;
     this.ground = new three.Mesh(new three.PlaneGeometry(2 * half, 2 * half), new three.ShadowMaterial({ opacity: 0.22, depthWrite: false }));
     this.ground.position.set(centre[0], centre[1], z);
@@ -178,18 +183,18 @@ export class Space extends Orbit {
     return new Set(meshes.filter((mesh) => rays.some((ray) => ray.intersectObject(mesh).length)));
   }
 
-  /** A line through points in space, `width` px wide; faint where a body is before it, unless it is not to be seen `through`. */
-  line(points, css, width = 2, through = true) {
+  /** A line through points in space, `width` px wide; faint where a body is before it. */
+  line(points, css, width = 2) {
     const pairs = points.slice(1).flatMap((point, i) => [...points[i], ...point]);
-    this.segments(pairs, css, width, through);
+    this.segments(pairs, css, width, ["hidden", "seen"]);
   }
 
-  /** Pieces of lines, given as coordinates of their ends. */
-  segments(pairs, css, width, through = true) {
-    for (const hidden of through ? [true, false] : [false]) {
+  /** Pieces of lines, given as coordinates of their ends; `looks`: see `LINES`. */
+  segments(pairs, css, width, looks) {
+    for (const look of looks) {
       const geometry = new three.LineSegmentsGeometry().setPositions(pairs);
-      const line = new three.LineSegments2(geometry, this.#pencil(css, width, hidden));
-      line.renderOrder = hidden ? 1 : 0;
+      const line = new three.LineSegments2(geometry, this.#pencil(css, width, look));
+      line.renderOrder = LINES[look].order;
       line.frustumCulled = false;
       this.strokes.add(line);
     }
@@ -264,11 +269,10 @@ export class Space extends Orbit {
     scene.add(new three.HemisphereLight("#ffffff", "#aab4c0", 2), lamp, lamp.target);
   }
 
-  #pencil(css, width, hidden) {
-    const key = `line ${css} ${width} ${hidden}`;
+  #pencil(css, width, look) {
+    const key = `line ${css} ${width} ${look}`;
     if (!this.materials.has(key)) {
-      const through = hidden ? { depthTest: false, transparent: true, opacity: HIDDEN } : {};
-      this.materials.set(key, new three.LineMaterial({ color: new three.Color(css), linewidth: width, ...through }));
+      this.materials.set(key, new three.LineMaterial({ color: new three.Color(css), linewidth: width, ...LINES[look].style }));
     }
     return this.materials.get(key);
   }

@@ -82,7 +82,7 @@ def _answer(
     ends = [0.0, *(each.clearance_mm for each in closest)]
     span = min(ends), max(ends)
     scale = tr("bars {low} to {high} mm", low=fixed(span[0], 0), high=fixed(span[1], 0))
-    second = tr("shapes assumed: ± {mm:g} mm", mm=shapes.margin_mm) if shapes else ""
+    second = tr("shapes assumed: keep {mm:g} mm", mm=shapes.margin_mm) if shapes else ""
     near = shapes.near if shapes else ()
     rows = [_row(each, unreached, near, known.get(each.name), span, lines) for each in closest]
     hit, clear, partly = (

@@ -61,7 +61,7 @@ def nearness_picture(
     ax.axhline(0.0, color=palette.TOUCHING, linewidth=1.2)
     if shapes:
         margin = shapes.margin_mm
-        text = tr("shapes assumed: ± {mm:g} mm", mm=margin)
+        text = tr("shapes assumed: keep {mm:g} mm", mm=margin)
         ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.45, linewidth=0, label=text)
     _key(ax)
     ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)

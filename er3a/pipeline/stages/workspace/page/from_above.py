@@ -7,8 +7,9 @@ from markupsafe import Markup
 
 from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import own_title, tr
+from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import outlines
@@ -45,7 +46,13 @@ def from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, tra
     (left, below), (right, above) = (1000 * corner[:2] for corner in tray.corners)
     corners = np.array([[left, below], [right, below], [right, above], [left, above]])
     parts.append(Markup('<polygon class="tray" points="{}"/>').format(_line(corners)))
-    words.append(_word(np.array([(left + right) / 2, below - height]), height, tr("tray"), "tray", size))
+    said = joined([tr("tray"), with_unit(tray.edges, "mm")], ", ")
+    words.append(_word(np.array([(left + right) / 2, below - height]), height, said, "tray", size))
+    x, y = 1000 * np.array(tray.place.centre_m[:2])
+    parts.append(Markup('<path class="way" d="M0,0H{:.0f}V{:.0f}"/>').format(x, -y))
+    for axis, value, middle in (("x", x, (x / 2, height)), ("y", y, (x, y / 2))):
+        if value:
+            words.append(_word(np.array(middle), height, with_unit(f"{axis} {fixed(value, 0)}", "mm"), "way", size))
     gap = 2 * np.pi - (high - low)
     if gap > DEAD:
         parts.append(Markup('<path class="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
@@ -53,6 +60,10 @@ def from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, tra
     parts.append(Markup('<path class="axes" d="M{0:.0f},0H0V-{0:.0f}"/>').format(AXES * reach))
     words += [_word((AXES + BASE) * reach * way, height, axis, "", size) for axis, way in zip("xy", np.eye(2))]
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
+    scale = 2 * 10.0 ** np.floor(np.log10(reach / 2))
+    parts.append(Markup('<path class="scale" d="M{:.0f},{:.0f}h{:.0f}"/>').format(-reach, size - height / 2, scale))
+    at = np.array([2 * height - reach, height - size])
+    words.append(_word(at, height, with_unit(fixed(scale, 0), "mm"), "", size))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))
     drawing = '<svg class="plan-view" viewBox="{}" role="img" aria-label="{}">{}</svg>'
