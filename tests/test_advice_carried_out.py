@@ -80,6 +80,7 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("centre_outside", "unlikely_density", "unlikely_inertia", "unexplained_residuals"),
     *("no_correction_fits", "contradiction", "advice.no_part"),
     *("read_limit", "time_joint"),
+    *("held_back_contradict", "held_back_elsewhere", "held_back_fitted"),
     *("payload", "why.coarse", "shapes_assumed"),
     *("validation.off", "validation.no_reference", "validation.defined_otherwise", "far_from_table"),
 }

@@ -121,7 +121,7 @@ def test_check_for_programs(call, tmp_path):
 def test_notes_go_to_standard_error_and_results_to_standard_output(call, tmp_path):
     urdf = tmp_path / "arm.urdf"
     assert call("export-urdf", "er3_600", "--output", urdf).returncode == 0
-    text = urdf.read_text().replace("1.5707963267948966", "1.5708", 1)
+    text = urdf.read_text().replace("1.5707963267948966", "1.571", 1)
     urdf.write_text(text)
     done = call("import-urdf", urdf, "--output", tmp_path / "arm.yaml", "--snap", "--json")
     assert done.stderr.startswith("note: ")

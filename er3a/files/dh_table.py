@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -38,7 +39,7 @@ from er3a.files.yaml_file import Content, parse
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, rpy_of, translation
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import RADIANS_BELOW_DEG, limit_in_degrees
-from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention, Grade
+from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention, Grade, Robot
 
 NEEDED = columns_of("joint:int? a_mm alpha_deg d_mm")
 OPTIONAL = columns_of(
@@ -109,9 +110,7 @@ def read_dh_table(
     if len(stated := {row["convention"] for row in rows if "convention" in given}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
     said = next(iter(stated), convention)
-    # A first row without a and alpha is usual in Craig's tables; read as standard, two joints would do one's work.
-    still = [not (row["a_mm"] or row["alpha_deg"]) for row in rows if row.get("type") not in FIXED]
-    idle = sum(still) == 1 and still[0] and still[1:] and _unit(rows[1]) == "deg"
+    idle = _first_is_idle(rows)
     convention = said or "standard"
     short = _short_lengths(path, rows, converted, as_printed, bool(length_unit or _calibrated(rows, convention)))
     _check_pairs_of_limits(path, given)
@@ -142,20 +141,38 @@ def read_dh_table(
         other, assumed = read_dh_table(path, name, way, columns=columns, **form)
         return other, (*assumed, "read as modified D-H: so it is a known arm's, as standard D-H none's")
     if way is None and idle:
-        problem = "read as standard D-H, joints 1 and 2 turn about one line; read as modified D-H, none do"
-        remedy = "Write modified D-H or standard D-H above the table, or say it by --convention"
-        raise InputError(path, "convention", problem, remedy)
+        raise _two_readings(path)
     return found, tuple(notes)
+
+
+def _first_is_idle(rows: Sequence[CsvRow]) -> bool:
+    """Whether the first row alone has neither a nor alpha, as is usual in Craig's tables; read as standard, two joints
+    would do one's work."""
+    still = [not (row["a_mm"] or row["alpha_deg"]) for row in rows if row.get("type") not in FIXED]
+    return sum(still) == 1 and still[0] and len(still) > 1 and _unit(rows[1]) == "deg"
+
+
+def _two_readings(path: Path) -> InputError:
+    problem = "read as standard D-H, joints 1 and 2 turn about one line; read as modified D-H, none do"
+    remedy = "Write modified D-H or standard D-H above the table, or say it by --convention"
+    return InputError(path, "convention", problem, remedy)
 
 
 def _known_as(content: RobotFile) -> Convention | None:
     """The convention in which alone a table's numbers are those of an arm of the catalogue, but for one; None if they
     are in neither."""
-    from er3a.comparison.nearest import misfits
+    from er3a.comparison.nearest import misfits  # most tables say their convention
     from er3a.files.arm_catalogue import known_arms
-    from er3a.files.robot_library import robot_of
 
-    robot = robot_of(content)
+    rows, zeros = content.dh.rows, content.zero.rows
+    with warnings.catch_warnings(action="ignore"):  # of units, which the table's own reader looks at
+        robot = Robot.from_dh(
+            np.array([row.a_mm for row in rows]) / 1000,
+            np.radians([row.alpha_deg for row in rows]),
+            np.array([row.d_mm for row in rows]) / 1000,
+            offset=np.radians([zero.offset_deg or row.theta_deg or 0.0 for row, zero in zip(rows, zeros)]),
+            sliding=np.array([row.type == "prismatic" for row in rows]),
+        )
     arms = [each.robot for each in known_arms().values() if np.array_equal(each.robot.sliding, robot.sliding)]
     off = misfits(robot, arms).min(axis=1).tolist() if arms else [np.inf]
     clear = min(off) < ONE_ENTRY and max(off) > min(off) + OTHERWISE

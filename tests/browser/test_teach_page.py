@@ -135,6 +135,7 @@ def used(closed) -> Panel:
 
 
 def test_opens_clean_in_one_small_file(browser, folder):
+    browser.get_log("browser")  # what other tests left there
     panel = Panel(browser, folder / "er3_600.html", "er3_600").open()
     panel.until(lambda: panel.browser.find_elements(By.CSS_SELECTOR, "#branches .solution"))
     assert panel.clean()

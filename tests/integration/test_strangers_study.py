@@ -67,7 +67,7 @@ def poison(folder: Path, marker: Path) -> None:
     text["config/study.yaml"], text["p.src"], text["data/a.csv"] = (
         STUDY,
         PROGRAM,
-        "joint,a_mm,alpha_deg,d_mm\n1,0,0,100\n2,200,90,0\n",
+        "joint,a_mm,alpha_deg,d_mm\n1,50,0,100\n2,200,90,0\n",
     )
     text |= {f"{name}": f"#!/bin/sh\n{shell}\n" for name in PROGRAMS}
     shutil.copytree(ROOT / "data", folder / "data")
