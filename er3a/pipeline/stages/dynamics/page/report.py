@@ -156,12 +156,11 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     most = max(most, *(each.peak + _moment_of(results, each)[2] for each in summary.motors)) or 1.0
     step = 10.0 ** np.floor(np.log10(most))
     scale = float(step * np.ceil(most / step))  # of all bars without a limit of their own
-    some = any(motor.peak_limit is not None for motor in order)
     rows, still = [], []
     for motor in order:
         path, t, off = _moment_of(results, motor)
         title = joined([f"J{motor.joint}", path], ", ")
-        rows.append(_row(motor, (motor.peak, off), title, (path, t), scale, motor.peak_limit if some else 0.0))
+        rows.append(_row(motor, (motor.peak, off), title, (path, t), scale, motor.peak_limit))
         name, held = holding_name(motor.joint), summary.holding[motor.joint - 1]
         if motor.holding + held.tolerance >= FEW * scale:
             still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), scale))
@@ -204,13 +203,12 @@ def _row(
     name: str,
     moment: tuple[str, float],
     most: float,
-    limit: float | None = 0.0,
+    limit: float | None = None,
 ) -> ListRow:
-    """What a joint needs at a moment with its tolerance, as a bar of its limit, or else of the scale of all; ``limit``:
-    None where it is not known, 0 where it is not asked for."""
+    """What a joint needs at a moment with its tolerance, as a bar of its limit, or else of the scale of all."""
     value, (share, spread) = within(*need, decimals=1), np.minimum(1.0, np.array(need) / (limit or most))
-    if limit != 0:
-        value = tr("{value} of {limit}", value=value, limit=number(limit, 2) if limit else "?")
+    if limit:
+        value = tr("{value} of {limit}", value=value, limit=number(limit, 2))
     mark = _mark(motor) if limit else "none"
     parts = [Part(0.0, share, mark), Part(share, 1.0, "rest"), Part(share - spread, share + spread, "spread")]
     return ListRow(mark, name, with_unit(value, motor.unit), f"#{moment[0]}", moment, 1.0, parts)

@@ -57,6 +57,7 @@ from er3a.pipeline.viewing.side_view import (
 )
 from er3a.references.predict import REACH_STARTS, search
 from er3a.references.quantities import AxisDistance
+from er3a.references.seen import SeenMotion
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -229,12 +230,12 @@ def jog_seen(robot: Robot, found: Finding) -> Markup:
     """
     q, jog = meant(robot, found.pose_deg), np.eye(robot.joints)[found.joint - 1]
     ways = np.array([[1000 * skeleton(robot, q + turn * jog) for turn in way] for way in (JOG, -JOG)])
-    manner, _, toward = found.seen.rpartition("_")
-    if manner:
+    manner = SeenMotion(found.pose_deg, found.joint, found.point, found.seen).manner
+    if manner != "moves":
         flanges = np.array([[frames(robot, q + turn * jog)[-1, :3, :3] for turn in way] for way in (JOG, -JOG)])
-        across = UP[1] if manner.startswith("clockwise") and toward in ("up", "down") else UP[0]
-        mark = flanges[0, 0, :, 2] if manner == "tilts" else np.array(across)
-        tips = flanges @ flanges[0, 0].T @ mark
+        marks = flanges[0, 0, :, 2:].T if manner == "tilts" else np.array(UP)
+        ways_of_marks = np.moveaxis(flanges @ flanges[0, 0].T @ marks.T, 3, 0)
+        tips = max(ways_of_marks, key=lambda way: float(np.linalg.norm(way[0, -1] - way[0, 0])))
         ways = np.stack([np.zeros_like(tips), MARK_MM * tips], axis=2)
     side = max(VIEWS, key=lambda each: np.linalg.norm((ways[0, -1, -1] - ways[0, 0, -1]) @ VIEWS[each]))
     own = int(robot.direction[found.joint - 1])
