@@ -45,8 +45,9 @@ def _(results: ValidationResults) -> Glance:
     counts, evidence = summary.counts.independent, summary.evidence
     value = f"{counts.passed}/{counts.total}" if counts.total else "0"
     if summary.verdict.status == "fail":
-        bad, value = evidence.contradicted if evidence else 0, f"{counts.total - counts.passed}/{counts.total}"
-        return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
+        bad = evidence.contradicted if evidence else 0
+        failed = f"{counts.total - counts.passed}/{counts.total}"
+        return failed, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
     for conflict in summary.conflicts[:1]:
         stated = [each.expected for each in conflict.statements]
         return value, tr("sources differ by {off}", off=with_unit(fixed(max(stated) - min(stated), 1), conflict.unit))
