@@ -471,7 +471,12 @@ def test_what_is_to_be_done_next_is_shown_in_the_picture(browser, small_study):
     browser.get((small_study.folder / "reports/er3a_c60/validation.html").as_uri())
     browser.execute_script("document.querySelector('.fix a').click()")
     WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(OUTLINED) == "#cell-direction1")
-    assert sorted(browser.execute_script(MARKED)) == ["look shown", "turn shown"]
+    told = "return document.querySelector('.now-shown').textContent"
+    assert browser.execute_script(told).startswith("+J1")
+    for entry, words in (("lower3", "lower limit 3"), ("d4", ""), ("direction4", "+J4")):
+        browser.execute_script(f"document.querySelector('.grid a[href$=cell-{entry}]').click()")
+        WebDriverWait(browser, PAUSE).until(lambda page, cell=f"#cell-{entry}": page.execute_script(OUTLINED) == cell)
+        WebDriverWait(browser, PAUSE).until(lambda page, said=words: page.execute_script(told).startswith(said))
     assert "alpha 6" in browser.execute_script("return document.querySelector('.chip').textContent")
 
 

@@ -60,7 +60,7 @@ MANNERS = words(
     {
         "moves": "the {point} moves {way}",
         "tilts": "the flange's z axis tilts {way}",
-        "clockwise": "the flange (mark it) turns clockwise, looking {way}",
+        "clockwise": "the flange turns clockwise, looking {way}",
     }
 )
 WAYS = words(

@@ -102,6 +102,7 @@ class PlayedMotion:
     ghosts : (n,) each, joint coordinates of poses in which the first arm is drawn pale all the while
     loads : (N, n), what each joint bears, N m, or N where it slides: a bar at each; None where nothing is known
     elevation : rad, of the eye: 0 for a side elevation
+    turned : rad, of the eye about the vertical; None for where the motion is seen best
     """
 
     name: str
@@ -115,6 +116,7 @@ class PlayedMotion:
     loads: Reals | None = None
     whole_s: float = 0.0
     elevation: float = ELEVATION
+    turned: float | None = None
 
 
 def at_rest(

@@ -159,7 +159,7 @@ function draw() {
   for (const [j, { status }] of failing()) {
     if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
   }
-  if (moves && arms.length === 1) nameEnds(motion.trails[0]);
+  if (moves && arms.length === 1 && !others.length) nameEnds(motion.trails[0]);
   space.keepClear(motion.trails[0], 0);
   for (const { from, to, text } of marks) if (text) space.word(text, scaled(add(from, to), 0.5), css);
   data.signs.forEach(({ text, at }, k) => space.word(text, wrong ? column(poses[k][3], 3) : at, k === 0 && wrong ? page.touching : page.ink));
@@ -366,6 +366,7 @@ addEventListener("resize", refresh);
 addEventListener("click", ({ target }) => target.closest("a[href^='teach.html#']")?.setAttribute("href", `teach.html?eye=${space.azimuth},${space.elevation}${target.closest("a").hash}`), true); // it is seen from the same side there
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
+addEventListener("entry", ({ detail }) => motions.has(detail) && goTo(detail, Infinity)); // of a table, where it leads
 /** Shows the moment that the query of an address asks for. */
 function answer(query) {
   if (!motions.has(query.get("play")) || !Number.isFinite(Number(query.get("t")))) return false;
@@ -384,9 +385,10 @@ document.querySelector(".hero .fix a")?.addEventListener("click", (event) => {
   play((asked.has("until") || t === start()) && t < playedUntil()); // or else the moment is what is to be seen
 });
 const row = document.querySelector(".runs [aria-current][data-t]"); // of the page's list, if its address names one
-const named = decodeURIComponent(location.hash.slice(1));
+const named = decodeURIComponent(location.hash.slice(1)), entry = named.replace(/^cell-/, "");
 if (!answer(asked)) {
   if (named !== row?.dataset.play && motions.has(named)) choose(named);
+  else if (entry !== named && motions.has(entry)) goTo(entry, Infinity);
   else goTo(...(named && row ? [row.dataset.play, Number(row.dataset.t)] : data.opened));
 }
 part("controls").hidden = part("joints").hidden = false;

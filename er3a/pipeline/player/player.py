@@ -94,7 +94,11 @@ def player(
     robots = (robot, *beside)
     turned = TURNED
     for own, motion in zip(data["motions"], shown):
-        if motion.events and not beside:  # what nothing is said of is the one before it in another way, and seen alike
+        if motion.turned is not None:
+            turned = motion.turned
+        elif (
+            motion.events and not beside
+        ):  # what nothing is said of is the one before it in another way, and seen alike
             gravest = min(reversed(motion.events), key=lambda event: GRAVEST.index(event.status))
             turned = best_turn(robot, motion, data["opened"][1] if motion is first else gravest.t, data)
         own |= _frame(data, robots, motion, turned) | {"turned": turned, "elevation": motion.elevation}

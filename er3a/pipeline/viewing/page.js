@@ -645,7 +645,7 @@ for (const row of rows) row.addEventListener("click", () => (row.dataset.play ? 
 addEventListener("hashchange", () => rows.filter((row) => !row.dataset.play && row.hash === location.hash).forEach(mark)); // as by the one thing to do
 const [named, asked] = [addressed(), new URLSearchParams(location.search)];
 mark(playing(asked.get("play"), asked.get("t")) ?? rows.find((row) => row.querySelector("b").textContent === named || row.hash === location.hash) ?? playing(named || document.querySelector(".player")?.dataset.opened) ?? rows[0]);
-const follow = ({ detail }) => rows.some((row) => row.ariaCurrent && row.dataset.play === detail) || choose(playing(detail), detail);
+const follow = ({ detail }) => rows.some((row) => row.ariaCurrent && row.dataset.play === detail) || (entryOf(location.hash) === detail ? mark(playing(detail)) : choose(playing(detail), detail));
 addEventListener("player", () => addEventListener("motion", follow)); // the first one is not of the reader's choice
 
 addFinder();
@@ -666,13 +666,10 @@ const entryOf = (hash) => hash?.slice(1).replace(/^(cell|entry)-/, "") || null;
 const entryLinks = document.querySelectorAll(".runs a[href^='#cell-'], .grid .entries a");
 const evidence = Object.assign(document.createElement("b"), { className: "evidence", role: "status" });
 document.querySelector(".grid .key")?.append(evidence);
-const next = document.querySelector(".hero:has(.look) .fix"), first = next && [next.querySelector("span").lastChild.data, next.querySelector("a").hash];
-function showEntry(entry = entryOf(location.hash)) {
+function showEntry(entry = entryOf(location.hash) || new URLSearchParams(location.search).get("play")) {
   for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
-  const look = document.querySelector(".look.shown"); // of a joint that is to be jogged: the one thing to do says it
   evidence.textContent = document.getElementById(`cell-${entry}`)?.querySelector("a")?.dataset.said ?? "";
   for (const link of document.querySelectorAll(".grid .key > a")) link.hash = document.getElementById(`entry-${entry}`)?.id ?? "marks";
-  if (next) [next.querySelector("span").lastChild.data, next.querySelector("a").hash] = look ? [` ${look.dataset.next}`, `#cell-${entry}`] : first;
   for (const link of entryLinks) link.toggleAttribute("data-shown", [entryOf(link.hash), link.dataset.asked].includes(entry));
 }
 for (const link of entryLinks) {
@@ -680,11 +677,9 @@ for (const link of entryLinks) {
   link.addEventListener("pointerleave", () => showEntry());
 }
 for (const part of document.querySelectorAll(".hero svg [data-entry]")) part.addEventListener("click", () => (location.hash = `cell-${part.dataset.entry}`));
-addEventListener("hashchange", () => showEntry());
+for (const event of ["hashchange", "motion"]) addEventListener(event, () => showEntry());
+addEventListener("hashchange", () => dispatchEvent(new CustomEvent("entry", { detail: entryOf(location.hash) }))); // the player shows it
 showEntry();
-// The one thing to do opens lines to copy, and plays the jog again.
+// The one thing to do opens lines to copy.
 const asking = document.querySelector(".hero .fix a");
-const jog = () => matchMedia("(prefers-reduced-motion: reduce)").matches || document.querySelectorAll(".look.shown animate").forEach((part) => part.beginElement());
-asking?.addEventListener("click", () => setTimeout(jog, 100));
 for (const lines of document.querySelectorAll(".hero .lines")) asking?.addEventListener("click", () => (lines.open = true));
-addEventListener("hashchange", jog);

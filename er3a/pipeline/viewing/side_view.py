@@ -54,7 +54,6 @@ class SeenArm:
     kind : of its colour
     points_mm : (k, 2), the joints' places from the base to the flange: forward, up
     reach_mm : outlines (m, 2) of what the tool point reaches
-    way : (t, k, 2), mm, how it came there; None of an arm that did not move
     """
 
     title: str
@@ -62,7 +61,6 @@ class SeenArm:
     kind: Kind
     points_mm: Reals
     reach_mm: Sequence[Reals] = ()
-    way: Reals | None = None
 
 
 @by_identity
@@ -105,14 +103,19 @@ def seen_arm(
 
 
 def entry_lines(robot: Robot, entries: Iterable[str], q: Reals) -> dict[str, Reals]:
-    """From where to where entries such as ``d4`` are seen (2, 2), mm, at joint values (n,), rad or m: a length along
+    """As :func:`entry_places`, from the side (2, 2), mm."""
+    return {entry: place[:, ::2] for entry, place in entry_places(robot, entries, q).items()}
+
+
+def entry_places(robot: Robot, entries: Iterable[str], q: Reals) -> dict[str, Reals]:
+    """From where to where entries such as ``d4`` are seen (2, 3), mm, at joint values (n,), rad or m: a length along
     its link, an angle at the end of its row, all else at the middle of its axis."""
     parts, T, found = link_parts(robot), frames(robot, q), {}
     for entry in entries:
         column = entry.rstrip("0123456789")
         row = int(entry.removeprefix(column))
         local = SEEN_AT.get(column, AT_JOINT) @ parts[row, [ALONG_Z, TO_NEXT_AXIS], :3, 3]
-        found[entry] = 1000 * (local @ T[row - 1, :3, :3].T + T[row - 1, :3, 3])[:, ::2]
+        found[entry] = 1000 * (local @ T[row - 1, :3, :3].T + T[row - 1, :3, 3])
     return found
 
 
@@ -317,12 +320,7 @@ def _arm(arm: SeenArm, thick: float) -> Markup:
         Markup('<circle cx="{:.0f}" cy="{:.0f}" r="{:.0f}"/>').format(x, -z, 0.22 * thick) for x, z in arm.points_mm
     )
     drawn = Markup(
-        '<polyline class="edge" points="{0}" stroke-width="{1:.0f}">{3}</polyline>'
-        '<polyline points="{0}" stroke-width="{2:.0f}">{3}</polyline>'
+        '<polyline class="edge" points="{0}" stroke-width="{1:.0f}"/><polyline points="{0}" stroke-width="{2:.0f}"/>'
     )
-    moved = Markup("")
-    if arm.way is not None:
-        joints, steps = moved, ";".join(map(_line, arm.way))
-        moved = Markup('<animate attributeName="points" dur="2s" begin="indefinite" values="{}"/>').format(steps)
-    drawn = drawn.format(line, thick, 0.78 * thick, moved)
+    drawn = drawn.format(line, thick, 0.78 * thick)
     return Markup('<g class="bones {}">{}{}</g>').format(arm.kind, drawn, joints)

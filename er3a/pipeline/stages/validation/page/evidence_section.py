@@ -108,6 +108,11 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     )
 
 
+def cells_of(section: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """What :func:`evidence_section` says of each entry, by its name."""
+    return {cell["entry"]: cell for _, row in section.get("rows", ()) for cell in row if cell}
+
+
 def to_settle(proposal: Finding) -> str:
     """What would settle an entry: of lengths and angles the poses of :func:`to_confirm`, whose second step they are."""
     if not is_one(proposal, "measure_angle", "measure_length"):
@@ -233,6 +238,7 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, proposals: Mappin
         entry=each.entry,
         value=_plain(each.value),
         status=each.trust,
+        unit=each.unit,
         look=look,
         mark=MARKS[look],
         title=tr("{entry}: {status}", entry=entry_word(each.entry), status=_status(each.trust)),

@@ -8,14 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
-from er3a.finding import Finding, is_one
+from er3a.finding import is_one
 from er3a.identifiability.entries import column_of
-from er3a.kinematics.forward import frames, skeleton
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr, unit_sign, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured
@@ -23,10 +20,13 @@ from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.references import entry_word
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES
+from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
+from er3a.pipeline.stages.validation.page.entries_played import entries_played, jog_rows
 from er3a.pipeline.stages.validation.page.evidence_section import (
+    cells_of,
     evidence_section,
     known_alone,
     other_robot,
@@ -35,7 +35,7 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     to_settle,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix
+from er3a.pipeline.viewing.answer import Answer, Fix, ListRow
 from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
@@ -44,10 +44,8 @@ from er3a.pipeline.viewing.page import (
 from er3a.pipeline.viewing.side_view import (
     UPRIGHT,
     DrawnLine,
-    Kind,
     Label,
     LabelKind,
-    SeenArm,
     beyond,
     dimension,
     entry_lines,
@@ -57,25 +55,11 @@ from er3a.pipeline.viewing.side_view import (
 )
 from er3a.references.predict import REACH_STARTS, search
 from er3a.references.quantities import AxisDistance
-from er3a.references.seen import SeenMotion
-from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-ANGLES = ("alpha", "beta", "offset")
-AROUND = np.radians(np.linspace([-110.0, -220.0], [110.0, 80.0], 31)).T  # of an arrow over an axis, and around one
-HEAD = 0.5  # of its radius, the length of its head
-TILT = 0.5  # of a circle around an axis in the drawing's plane, seen a little from above
-RADIUS = 0.036  # of such an arrow, of the size of the arm
 BELOW = 0.15  # of a reach: from one line to the next below the base
 LARGER, GLASS = 10, 0.8  # the difference between what documents state, in a glass of this radius, of such a step
 ROUND = np.linspace(0.0, 2 * np.pi, 49)
-AHEAD = 1.12  # of the way to a jogged arm's end: what is said of it
-UP, MARK_MM = [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)], 1000.0  # where a mark on the flange is that is seen to turn
-JOG = np.radians(np.linspace(0.0, 30.0, 13))  # of a joint that one looks at
-VIEWS = {  # from x, y and z to what is to the right and upwards for one who looks from there
-    N_("from behind"): [(0, 0.6), (-1, 0), (0, 0.8)],  # and from a little above
-    N_("from the side"): [(1, 0), (0, 0), (0, 1)],
-}
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
     N_("Check"),
@@ -119,20 +103,18 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     instead = alternative_table(study, stored.robot, stored.folder) if summary.verdict.status == "fail" else None
     evidence = evidence_section(summary.evidence)
     disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
-    q = np.zeros(robot.joints)
-    for each in disputed[:1]:
-        _, q = search(robot, AxisDistance(**each.subject.params), REACH_STARTS)
+    other = study.robot(instead) if instead else other_robot(robot, summary.evidence)
+    pictured = _pictured(robot, other, evidence or {}, disputed)
     render_stage(
         study,
         stored,
         output,
         _answer(study, name, summary, instead, disputed),
-        arms=_both_arms(
-            robot,
-            study.robot(instead) if instead else other_robot(robot, summary.evidence),
-            evidence or {},
-            disputed,
-            q,
+        **pictured,
+        steps=_steps(
+            summary.evidence.contradicted if summary.evidence else 0,
+            (evidence or {}).get("first", ()),
+            pictured["jogs"],
         ),
         at_side=True,
         plain_table=None if evidence else plain_table(robot),
@@ -150,20 +132,27 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     )
 
 
-def _both_arms(
-    robot: Robot, other: Robot | None, evidence: Mapping[str, Any], disputed: Sequence[model.Conflict], q: Reals
-) -> Markup:
-    """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
-    scale.
+def _pictured(
+    robot: Robot, other: Robot | None, evidence: Mapping[str, Any], disputed: Sequence[model.Conflict]
+) -> dict[str, Any]:
+    """What the page shows at its left: the arm, which goes where an entry is asked for; or else from the side, at one
+    scale, what is wrong of it.
 
-    The lengths that evidence contradicts are named, and angles that it leaves open. Where each entry is seen is
-    marked while it is asked for, with what the other arm has instead. Where documents contradict each other about a
-    reach, the arm is stretched, and what each states is a dimension from axis 1 on below it, with its source; that of
-    the table in its colour."""
+    Of a table that is contradicted the arm is drawn over the one that documents describe, and lengths that are wrong
+    are named; where each entry is seen is marked while it is asked for, with what the other arm has instead. Where
+    documents contradict each other about a reach, the arm is stretched, and what each states is a dimension from axis 1
+    on below it, with its source; that of the table in its colour."""
+    cells, looks, q = cells_of(evidence), evidence.get("looks", ()), np.zeros(robot.joints)
+    for each in disputed[:1]:
+        _, q = search(robot, AxisDistance(**each.subject.params), REACH_STARTS)
     arms = [seen_arm(robot, tr("This table"), tr("stretched out") if disputed else "", q=q)]
     if other is not None:
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), q=q))
     off = flanges_off(arms)
+    if not (off or disputed):
+        motions = entries_played(robot, cells, looks)
+        picture = player(robot, motions, opened=(motions[0].name, float(motions[0].t[-1])))
+        return {"picture": picture, "drawing_head": drawing_head(), "jogs": jog_rows(robot, looks)}
     arms = [arms[0], replace(arms[-1], kind="wrong")] if off else arms[-1:]
     own = arms[-1]
     labels, over = list[Label](), list[DrawnLine]()
@@ -188,106 +177,35 @@ def _both_arms(
             labels.append(Label(fixed(end, 1), line[0] + [-step / 4, way * step / 2], kinds[end], written_there=True))
         text = tr("{far}, {times} times larger", far=with_unit(fixed(np.ptp(ends), 1), each.unit), times=LARGER)
         labels.append(Label(text, glass - [step, 1.4 * step], "open", "seen", written_there=True))
-    cells = {cell["entry"]: cell for _, row in evidence.get("rows", ()) for cell in row if cell}
     lines, right = entry_lines(robot, cells, q), entry_lines(other, cells, q) if off and other else {}
-    radius = RADIUS * float(np.ptp(own.points_mm, axis=0).max())
     for entry, cell in cells.items():
         column, kind, gives = column_of(entry), cell["look"], cell["gives"]
-        if column == "direction" and kind == "open":
-            if disputed or off:  # what is asked is a length, or another table
-                continue
-            turn = _turn_arrow(robot, q, entry, lines[entry][0], radius)
-            over.append(replace(turn, points=_headed(turn.points[::-1], radius)) if cell["status"] == "open" else turn)
-            continue
-        angle = column in ANGLES
-        if not disputed and cell["status"] == "open" if angle else column in "ad" and kind == "wrong":
-            said = with_unit(
-                joined([cell["value"], gives], " → " if kind == "wrong" else tr(" or ")), "deg" if angle else "mm"
-            )
-            text = joined([entry_word(entry), said + "?" * (kind == "open")], ": ")
-            labels.append(Label(text, lines[entry].mean(0), kind, entry))
+        if column in "ad" and kind == "wrong":
+            said = with_unit(joined([cell["value"], gives], " → "), "mm")
+            labels.append(Label(joined([entry_word(entry), said], ": "), lines[entry].mean(0), kind, entry))
         over.append(DrawnLine(lines[entry], f"mark {own.kind}", entry))
-        if angle and kind == "open" and gives:
-            over += _readings(robot, q, entry, (cell["value"], gives), radius)
         if entry in right:
             over.append(DrawnLine(right[entry], "mark right", entry, gives or cell["value"]))
     labels += off
     drawn = side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=beyond(arms), over=over)
-    return drawn + Markup("").join(jog_seen(robot, each) for each in evidence.get("looks", ()))
+    return {"picture": drawn, "drawing_head": "", "jogs": []}
 
 
-def jog_seen(robot: Robot, found: Finding) -> Markup:
-    """Where the arm goes when a joint is jogged, and where it would if its direction were the other, seen from where
-    the flange is farthest off; where the flange turns in its place, where a mark on it goes.
-
-    Parameters
-    ----------
-    found : a proposal to look at a motion: joint, pose in deg, and how it is seen to move
-
-    Returns
-    -------
-    drawing : in HTML
-    """
-    q, jog = meant(robot, found.pose_deg), np.eye(robot.joints)[found.joint - 1]
-    ways = np.array([[1000 * skeleton(robot, q + turn * jog) for turn in way] for way in (JOG, -JOG)])
-    manner = SeenMotion(found.pose_deg, found.joint, found.point, found.seen).manner
-    if manner != "moves":
-        flanges = np.array([[frames(robot, q + turn * jog)[-1, :3, :3] for turn in way] for way in (JOG, -JOG)])
-        marks = flanges[0, 0, :, 2:].T if manner == "tilts" else np.array(UP)
-        ways_of_marks = np.moveaxis(flanges @ flanges[0, 0].T @ marks.T, 3, 0)
-        tips = max(ways_of_marks, key=lambda way: float(np.linalg.norm(way[0, -1] - way[0, 0])))
-        ways = np.stack([np.zeros_like(tips), MARK_MM * tips], axis=2)
-    side = max(VIEWS, key=lambda each: np.linalg.norm((ways[0, -1, -1] - ways[0, 0, -1]) @ VIEWS[each]))
-    own = int(robot.direction[found.joint - 1])
-    kinds: dict[Kind, str] = {"right": N_("keep {value}"), "wrong": N_("enter {value}")}
-    arms = [
-        SeenArm(tr(kinds[kind], value=fixed(value, 0)), "", kind, way[-1], way=way)
-        for kind, way, value in zip(kinds, ways @ VIEWS[side], (own, -own))
+def _steps(contradicted: int, first: Sequence[ListRow], jogs: Sequence[ListRow]) -> list[dict[str, Any]]:
+    """The list at the table's side: the worst entries, or what to confirm; of the first step each joint, where the
+    picture shows them."""
+    if not first:
+        return []
+    if contradicted:
+        title = tr("The {shown} worst of {all} wrong entries", shown=len(first), all=contradicted)
+        return [{"title": title, "beside": tr("at worst, tool off by"), "rows": first}]
+    if not jogs:
+        return [{"title": tr("Confirm in this order"), "beside": tr("if wrong, tool off by"), "rows": first}]
+    then = [replace(row, fix=Fix(row.name, row.address, instead=False)) for row in first[1:]]
+    return [
+        {"title": first[0].name, "beside": tr("if wrong: {off}", off=first[0].note), "rows": jogs},
+        {"title": tr("Then"), "beside": "", "rows": then},
     ]
-    size = 2 * RADIUS * float(np.ptp(arms[0].points_mm, axis=0).max())
-    turns = [DrawnLine(_headed(np.array(arm.way)[:, -1], size), f"turn {arm.kind}") for arm in arms]
-    labels = [Label(arm.title, AHEAD * arm.points_mm[-1], arm.kind) for arm in arms]
-    before = DrawnLine(np.array(arms[0].way)[0], "before")
-    drawn = side_view(arms, ratio=1.0, labels=labels, over=[before, *turns])
-    title = tr("+J{joint}, {side}", joint=found.joint, side=tr(side))
-    look = '<div class="look" data-entry="{}" data-next="{}"><b>{}</b>{}</div>'
-    return Markup(look).format(found.entry, say(found), title, drawn)
-
-
-def _readings(robot: Robot, q: Reals, entry: str, values: Sequence[str], size: float) -> list[DrawnLine]:
-    """Where the flange's z points, or its x if a turn about z is asked for, for each of an angle's values."""
-    column, found = column_of(entry), list[DrawnLine]()
-    axis = "z" if column == "alpha" else "x"
-    for value, look in zip(values, ("right", "open")):
-        table = getattr(robot, column).copy()
-        table[int(entry.removeprefix(column)) - 1] = np.radians(float(value.replace("−", "-")))
-        T = frames(robot.replace(**{column: table}), q)[-1, :3:2]
-        way = 1000 * T[:, 3] + size * np.outer(np.arange(4), T[:, "xyz".index(axis)])
-        text = tr("{axis} if {value}", axis=axis, value=with_unit(value, "deg"))
-        found.append(DrawnLine(_headed(way, size), f"mark reading {look}", entry, text))
-    return found
-
-
-def _turn_arrow(robot: Robot, q: Reals, entry: str, at: Reals, radius: float) -> DrawnLine:
-    """An arrow about a place (2,), mm, as an axis turns with its joint's value: before an axis in the drawing's
-    plane, over one across it; the arm is at joint values (n,), rad or m."""
-    joint = int(entry.removeprefix("direction"))
-    axis = robot.direction[joint - 1] * frames(robot, q)[joint - 1, :3, 2]
-    across = abs(axis[1]) > np.sqrt(0.5)
-    first = [0.0, 0.0, 1.0] if across else [0.0, -1.0, 0.0]
-    turn = AROUND[0 if across else 1]
-    ring = np.outer(np.cos(turn), first) + np.outer(np.sin(turn), np.cross(axis, first))
-    seen = ring[:, ::2] + TILT * ring[:, 1:2] * np.abs(axis[::2])
-    return DrawnLine(_headed(at + radius * seen, radius), "turn", entry, f"J{joint}")
-
-
-def _headed(line: Reals, size: float) -> Reals:
-    """A line (k, 2) with an arrow's head of a size at its end."""
-    tip, back = line[-1], line[-3] - line[-1]
-    back *= HEAD * size / np.linalg.norm(back)
-    wide = back[::-1] * [-0.7, 0.7]
-    found: Reals = np.stack([*line, tip + back + wide, tip, tip + back - wide])
-    return found
 
 
 def _answer(

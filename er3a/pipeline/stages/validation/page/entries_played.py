@@ -1,0 +1,114 @@
+"""What each entry of a table is of, as a motion that the page's player shows: a jog, a way to a limit, a place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from er3a.finding import Finding
+from er3a.identifiability.entries import column_of
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.references import entry_word, motion_seen
+from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, address_of, at_rest
+from er3a.pipeline.viewing.answer import Fix, ListRow
+from er3a.pipeline.viewing.side_view import entry_places
+from er3a.pipeline.viewing.still import AZIMUTH, ELEVATION, axes_of
+from er3a.references.seen import SeenMotion
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
+
+JOG = 30.0  # deg, or mm of a joint that slides
+STEPS, LASTS_S = 13, 2.0
+TIP_M = 0.2  # from the flange to a mark on it, where it turns in its place
+LOOKED_FROM = (np.pi, -np.pi / 2)  # azimuth of the eye: from behind the arm, and from its right side
+LENGTHS, ANGLES, LIMITS = ("a", "d"), ("alpha", "beta", "offset"), ("lower", "upper")
+
+
+def jog_rows(robot: Robot, looks: Iterable[Finding]) -> list[ListRow]:
+    """Each joint that is to be jogged, with what is seen if its direction is right, as a row of the page's list.
+
+    Parameters
+    ----------
+    looks : proposals to look at a motion
+    """
+    rows = []
+    for look in looks:
+        note = tr("or else enter {value}", value=fixed(-robot.direction[look.joint - 1], 0))
+        fix = Fix(say(look), address_of("validation", look.entry, 0.0, ""), instead=False)
+        rows.append(ListRow("caution", _asked(look), note, f"#cell-{look.entry}", (look.entry, LASTS_S), fix=fix))
+    return rows
+
+
+def entries_played(robot: Robot, cells: Mapping[str, Any], looks: Iterable[Finding]) -> list[PlayedMotion]:
+    """A motion by the name of each entry: of a direction a jog, of a limit the way there, of all else where it is seen
+    on the arm; the arm alone where nothing is known of an entry.
+
+    Parameters
+    ----------
+    cells : of the page's table, by entry
+    looks : proposals to look at a motion
+    """
+    found = [_jogged(robot, look) for look in looks]
+    zero = np.zeros(robot.joints)
+    places = entry_places(robot, cells, zero)
+    for entry, cell in cells.items():
+        column = column_of(entry)
+        values = joined(filter(None, (cell["value"], cell["gives"])), tr(" or "))
+        said = with_unit(joined([entry_word(entry), values], " "), cell["unit"])
+        if column in LIMITS:
+            end = zero.copy()
+            joint = int(entry.removeprefix(column)) - 1
+            end[joint] = getattr(robot, column)[joint]
+            share = np.linspace(0.0, 1.0, STEPS)
+            said_there = [PlayedEvent(0.0, LASTS_S, said, "plain")]
+            found.append(PlayedMotion(entry, "", LASTS_S * share, share[:, None] * end, said_there, turned=0.0))
+        elif column in LENGTHS or column in ANGLES:
+            (x, y, z), last = (places[entry] / 1000).tolist()
+            mark = Mark(0.0, 1.0, (x, y, z), tuple(last), said)
+            found.append(at_rest(robot, entry, q=zero, marks=[mark], turned=0.0))
+    return found or [at_rest(robot, robot.name, q=zero)]
+
+
+def _asked(look: Finding) -> str:
+    return joined([f"+J{look.joint}", tr("{motion}?", motion=motion_seen(look))], ": ")
+
+
+def _jogged(robot: Robot, look: Finding) -> PlayedMotion:
+    """A jog in +, with the arm as it would end if the direction were the other; words where the flange is then, or a
+    mark on it that turns with it, seen from where these are farthest from each other."""
+    start, joint = meant(robot, look.pose_deg), look.joint - 1
+    jog = meant(robot, JOG * np.eye(robot.joints)[joint])
+    T = forward(robot, np.stack([start + jog, start - jog]))
+    turning = SeenMotion(look.pose_deg, look.joint, look.point, look.seen).manner != "moves"
+    marks = T[:, :3, 3] + TIP_M * np.moveaxis(T[:, :3, :3], 2, 0) if turning else T[None, :, :3, 3]
+    ends = max(marks, key=lambda each: float(np.linalg.norm(each[0] - each[1])))
+    seen = max(LOOKED_FROM, key=lambda each: float(np.linalg.norm(axes_of(each, ELEVATION)[:2] @ (ends[0] - ends[1]))))
+    own = int(robot.direction[joint])
+    words = tr("keep {value}", value=fixed(own, 0)), tr("enter {value}", value=fixed(-own, 0))
+    return PlayedMotion(
+        look.entry,
+        "",
+        np.linspace(0.0, LASTS_S, STEPS),
+        start + np.linspace(0.0, 1.0, STEPS)[:, None] * jog,
+        [PlayedEvent(0.0, LASTS_S, _asked(look), "caution", joints=((look.joint, ""),))],
+        [*map(_said_at, ends, words), *(map(_line, T[:, :3, 3], ends) if turning else ())],
+        ghosts=[start - jog],
+        turned=seen - AZIMUTH,
+    )
+
+
+def _said_at(place: Reals, word: str) -> Mark:
+    x, y, z = place.tolist()
+    return Mark(LASTS_S, LASTS_S, (x, y, z), (x, y, z), word)
+
+
+def _line(start: Reals, end: Reals) -> Mark:
+    x, y, z = start.tolist()
+    return replace(_said_at(end, ""), start=(x, y, z))
