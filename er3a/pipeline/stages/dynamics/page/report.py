@@ -26,7 +26,7 @@ from er3a.pipeline.viewing.palette import JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
-FEW = 0.01  # of the longest bar: what holds less is not listed
+FEW = 0.02  # of the longest bar: joints that bear less are one line
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
@@ -113,7 +113,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
 
 def _opened(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[str, float]:
     """Where a joint needs most: the pose that it holds, if that asks for more than any path."""
-    return (holding_name(motor.joint), 0.0) if motor.holding > motor.peak else _moment_of(results, motor)[:2]
+    return max(_needs(results, motor))[2]
 
 
 def _moment_of(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[str, float, float]:
@@ -123,10 +123,19 @@ def _moment_of(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[
     return str(rows.path[at]), float(rows.t_s[at]), float(rows.tolerance[at, motor.joint - 1])
 
 
+def _needs(
+    results: model.DynamicsResults, motor: model.MotorNeed
+) -> list[tuple[tuple[float, float], str, tuple[str, float]]]:
+    """The most that a joint bears at rest and moving, with its tolerance; when that is, in words and for a player."""
+    path, t, off = _moment_of(results, motor)
+    held, name = results.summary.holding[motor.joint - 1], holding_name(motor.joint)
+    moving = (motor.peak, off), joined([f"J{motor.joint}", path], ", "), (path, t)
+    return [((motor.holding, held.tolerance), name, (name, 0.0)), moving]
+
+
 def _need(results: model.DynamicsResults, motor: model.MotorNeed) -> str:
     """The most that a joint bears, moving or at rest, with the tolerance of that; nothing where no mass is known."""
-    held = results.summary.holding[motor.joint - 1]
-    most = max((motor.peak, _moment_of(results, motor)[2]), (motor.holding, held.tolerance))
+    most, *_ = max(_needs(results, motor))
     return with_unit(within(*most), motor.unit) if any(most) else "?"
 
 
@@ -151,20 +160,24 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     headline = tr("Within all limits.") if limited else bears
     if over:
         headline = tr("Too much for {joints}.", joints=joined(over, ", "))
-    order = sorted(summary.motors, key=lambda motor: -motor.peak)
-    most = max(each.holding + held.tolerance for each, held in zip(summary.motors, summary.holding))
-    most = max(most, *(each.peak + _moment_of(results, each)[2] for each in summary.motors)) or 1.0
+    needs = [(motor, *need) for motor in summary.motors for need in _needs(results, motor)]
+    most = max(sum(need) for _, need, *_ in needs) or 1.0
     step = 10.0 ** np.floor(np.log10(most))
     scale = float(step * np.ceil(most / step))  # of all bars without a limit of their own
-    rows, still = [], []
-    for motor in order:
-        path, t, off = _moment_of(results, motor)
-        title = joined([f"J{motor.joint}", path], ", ")
-        rows.append(_row(motor, (motor.peak, off), title, (path, t), scale, motor.peak_limit))
-        name, held = holding_name(motor.joint), summary.holding[motor.joint - 1]
-        if motor.holding + held.tolerance >= FEW * scale:
-            still.append(_row(motor, (motor.holding, held.tolerance), name, (name, 0.0), scale))
-    bars, few = (with_unit(f"{share * scale:g}", worst.unit) for share in (1.0, FEW))
+    felt = [each for each in needs if each[0].peak_limit is not None or sum(each[1]) >= FEW * scale]
+    felt.sort(key=lambda each: -each[1][0])
+    still, moving = (
+        [
+            _row(motor, need, title, moment, scale, None if rests else motor.peak_limit)
+            for motor, need, title, moment in felt
+            if (moment[0] == holding_name(motor.joint)) == rests
+        ]
+        for rests in (True, False)
+    )
+    few = [f"J{motor.joint}" for motor in summary.motors if motor not in [each[0] for each in felt]]
+    ends = [with_unit(f"{share * scale:g}", worst.unit) for share in (1.0, FEW)]
+    if few:
+        moving.append(ListRow("none", joined(few, ", "), tr("less than {few}", few=ends[1])))
     left = [
         tr(WITHOUT[each.reason], links=joined(each.names, " + ")) for each in summary.assumed if each.reason in WITHOUT
     ]
@@ -175,10 +188,10 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         tr("± from the masses. Not included: {parts}.", parts=joined(left, ", ")) if left else "",
         [payload],
         [
-            Group(title, found, counted=False)
-            for title, found in (
-                (tr("Greatest torque on the paths"), rows),
-                (tr("Holding at least {few}; bars to {most}", few=few, most=bars), still),
+            Group(title, rows, counted=False)
+            for title, rows in (
+                (tr("Held in the worst pose; bars to {most}", most=ends[0]), still),
+                (tr("Greatest torque on the paths"), moving),
             )
         ],
         None if limited else Fix(todo, "#drives", False),
