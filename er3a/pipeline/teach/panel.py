@@ -81,6 +81,7 @@ WORDS: dict[str, Any] = {
     "no_number": N_("{joint} needs a number, in degrees."),
     "no_length": N_("{joint} needs a number, in millimetres."),
     "zero": N_("Zero pose"),
+    "apart": N_("flange {off} off"),
     "copied": N_("The joints are copied: {text}"),
     "link_copied": N_("The link to this pose is copied."),
     "not_copied": N_("This browser does not let pages copy; copy it from here: {text}"),
@@ -224,6 +225,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         robot_pages=study.pages(name),
         first_caveat=caveat(read_foundation(validated) if known else "not_computed"),
         instead=instead,
+        right=study.robot(instead) if instead else None,
         head=program_head(validated if known else None),
         condition=condition_of(validated) if known else ("", 0),
         command=run_command(study, f"{name}/teach.html"),
@@ -251,6 +253,7 @@ def write_panel(
     robot_pages: Sequence[str] = (),
     first_caveat: Caveat | None = None,
     instead: str | None = None,
+    right: Robot | None = None,
     head: Sequence[str] | None = None,
     condition: tuple[str, int] = ("", 0),
 ) -> None:
@@ -265,7 +268,8 @@ def write_panel(
     robots, robot_pages : of the study: arms with a panel (name, title, address), and this arm's other pages
     first_caveat : what to know of its table, if anything; condition : what of it has to be confirmed, and
         how many entries these are
-    instead : of ``robots`` that of the table to use where evidence contradicts this one
+    instead, right : of ``robots`` that of the table to use where evidence contradicts this one; its arm, shown over
+        this one
     head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
@@ -278,7 +282,9 @@ def write_panel(
     )
     opened = rows[(Bodies(robot, scene).free(rows, NEAR_TOUCH) & ~near.contains(robot, rows)).argmax()]
     solids = drawn_scene(scene.solids if scene else (), robot)
+    others = [arm for arm in (right,) if arm is not None and arm.joints == robot.joints]
     panel = own | {
+        "others": [{"table": table_data(arm), **drawn_arm(arm)} for arm in others],
         "wrong": first_caveat is not None and first_caveat.status == "fail",
         "scene": solids,
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
@@ -305,7 +311,7 @@ def write_panel(
         condition=condition,
         panel=panel,
         drawing_head=drawing_head([*SPACE, *sorted(_HERE.glob("*.js"))]),
-        still=scene_still(panel, [poses_at(robot, opened)], {}, panel["turned"]).markup(),
+        still=scene_still(panel, [poses_at(arm, opened) for arm in (robot, *others)], {}, panel["turned"]).markup(),
         command=command,
         provenance=provenance,
     )

@@ -1,7 +1,7 @@
 /** The picture of the arm: what is drawn at given joint angles. */
 
-import { add, column, moved, scaled } from "er3a/algebra";
-import { frames, tableFrames } from "er3a/kinematics";
+import { add, column, moved, scaled, subtract } from "er3a/algebra";
+import { constantLinks, frames, tableFrames } from "er3a/kinematics";
 import { alongArm, Arm, ARM, Space, WORLD } from "er3a/space";
 
 export class ArmView extends Space {
@@ -13,11 +13,12 @@ export class ArmView extends Space {
     Object.assign(this, { data, table, links, reach: size, rows: names, base: column(table.base, 3), turn0: data.turned });
     this.surroundings = this.add(data.scene ?? []);
     [this.arm, this.other] = [data.carried ?? [], []].map((carried) => new Arm(this, data, carried));
+    this.others = (data.others ?? []).map((other) => ({ table: other.table, links: constantLinks(other.table), shown: new Arm(this, other) })); // over a wrong table's arm
     if (!location.search.includes("eye=")) this.look("overview");
   }
 
   /**
-   * Draws the arm at joint values `q` by a look of `Arm`, a pale one at `ghost` (null for none), the table's frames with these numbers, and
+   * Draws the arm, and the right one over it if its table is wrong, at joint values `q` by a look of `Arm`, a pale one at `ghost` (null for none), the table's frames with these numbers, and
    * the nearest pair, `{from, to, text, touching}`: a line, and bodies of those names in red.
    */
   show(q, ghost, numbers = [], nearest = null, look = "visual") {
@@ -34,6 +35,13 @@ export class ArmView extends Space {
     this.place(this.surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) || mesh.shape.large);
     this.keepClear(alongArm(poses), ARM * reach);
     this.#frame(poses.at(-1), 0.11, ["x", "y", "z"]);
+    for (const other of this.others) {
+      const right = this.#poses(q, other);
+      const [from, to] = [poses, right].map((own) => column(own.at(-1), 3));
+      other.shown.show(right, new Map(), look);
+      this.keepClear(alongArm(right), ARM * reach);
+      nearest = { from, to, text: data.words.apart.replace("{off}", `${(1000 * Math.hypot(...subtract(to, from))).toFixed(0)} mm`), touching: [] };
+    }
     if (nearest?.text) this.#nearest(nearest);
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
     else this.#axes(poses);
@@ -42,8 +50,8 @@ export class ArmView extends Space {
   }
 
   /** Poses of base, the frames that the joints turn, and tool. */
-  #poses(q) {
-    return [this.table.base, ...frames(this.table, this.links, q)];
+  #poses(q, { table, links } = this) {
+    return [table.base, ...frames(table, links, q)];
   }
 
   #nearest({ from, to, text, touching }) {
