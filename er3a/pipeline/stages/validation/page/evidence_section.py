@@ -108,7 +108,7 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     )
 
 
-def cells_of(section: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+def cells_of(section: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """What :func:`evidence_section` says of each entry, by its name."""
     return {cell["entry"]: cell for _, row in section.get("rows", ()) for cell in row if cell}
 
@@ -245,6 +245,7 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, proposals: Mappin
         gives=_other_given(each, evidence),
         said=_said(each, evidence, proposals),
         unsure=len(each.by) == 1,
+        behind=False,
     )
 
 

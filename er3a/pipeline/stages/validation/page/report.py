@@ -13,6 +13,8 @@ from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.finding import is_one
 from er3a.identifiability.entries import column_of
+from er3a.kinematics.forward import frames
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr, unit_sign, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured
@@ -24,7 +26,7 @@ from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
-from er3a.pipeline.stages.validation.page.entries_played import entries_played, jog_rows
+from er3a.pipeline.stages.validation.page.entries_played import LENGTHS, entries_played, jog_rows
 from er3a.pipeline.stages.validation.page.evidence_section import (
     cells_of,
     evidence_section,
@@ -58,6 +60,7 @@ from er3a.references.quantities import AxisDistance
 from er3a.robots.robot import Robot
 
 BELOW = 0.15  # of a reach: from one line to the next below the base
+LONGER_M, MATTERS = 1e-3, 0.1  # what a length is changed by, and the part of it by which a reach changes that it is in
 LARGER, GLASS = 10, 0.8  # the difference between what documents state, in a glass of this radius, of such a step
 ROUND = np.linspace(0.0, 2 * np.pi, 49)
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
@@ -144,7 +147,10 @@ def _pictured(
     on below it, with its source; that of the table in its colour."""
     cells, looks, q = cells_of(evidence), evidence.get("looks", ()), np.zeros(robot.joints)
     for each in disputed[:1]:
-        _, q = search(robot, AxisDistance(**each.subject.params), REACH_STARTS)
+        reach = AxisDistance(**each.subject.params)
+        _, q = search(robot, reach, REACH_STARTS)
+        _mark_behind(robot, reach, q, cells)
+        evidence["legend"].append(("open behind", tr("in this reach")))
     arms = [seen_arm(robot, tr("This table"), tr("stretched out") if disputed else "", q=q)]
     if other is not None:
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), q=q))
@@ -189,6 +195,17 @@ def _pictured(
     labels += off
     drawn = side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=beyond(arms), over=over)
     return {"picture": drawn, "drawing_head": "", "jogs": []}
+
+
+def _mark_behind(robot: Robot, reach: AxisDistance, q: Reals, cells: Mapping[str, dict[str, Any]]) -> None:
+    """Mark the lengths of the table that a reach is made of, at joint values (n,), rad or m."""
+    for entry, cell in cells.items():
+        column = column_of(entry)
+        if column in LENGTHS:
+            longer = getattr(robot, column).copy()
+            longer[int(entry.removeprefix(column)) - 1] += LONGER_M
+            ends = [reach.measure(frames(arm, q)) for arm in (robot, robot.replace(**{column: longer}))]
+            cell["behind"] = bool(np.abs(np.diff(ends)) > MATTERS * LONGER_M)
 
 
 def _steps(contradicted: int, first: Sequence[ListRow], jogs: Sequence[ListRow]) -> list[dict[str, Any]]:
