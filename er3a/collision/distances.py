@@ -38,6 +38,7 @@ HULL, CYLINDER, HALF_SPACE = 0, 1, 2
 WORLD = -1  # link of the bodies around the arm
 DEEPEST = 512  # boxes that wait at one time
 FREE, MEETS, UNDECIDED = 0, 1, 2
+LIKELY = 3  # places of a move at which it is tried first
 NARROW = 1e-6  # m; a box in which bodies move by less is not halved
 BEYOND = (
     1e-3  # m; surfaces are measured so much farther than settles a box, as what is returned may be no more than that
@@ -309,24 +310,62 @@ def measure(layout: Layout, q: Reals, smallest: Reals, pair: Integers, deep: Fla
     smallest, pair : (N,), get the smallest distance, m, and its number; joined pairs count only where they overlap
     deep : (N,), gets whether cores overlapped, or a surface and another body, whose depth is not known then
     """
-    room, near = np.empty((ROOM, 3)), np.zeros((2, 3))
-    T, w, middle = unplaced(layout)
-    reach, first, second = layout.reach, layout.first, layout.second
-    root, count, at = layout.trees.root, len(first), -1
+    room, near, placed, at = np.empty((ROOM, 3)), np.zeros((2, 3)), unplaced(layout), -1
     for n in range(q.shape[0]):
-        place(layout, q[n], T, w, middle)
-        start, best, at, inside = max(at, 0), np.inf, -1, False
-        for turn in range(-count, count):
-            k = (start + turn) % count
-            a, b = first[k], second[k]
-            surface, far = root[a] >= 0 or root[b] >= 0, 0.0 if turn < 0 else best
-            if inside or (turn < 0 and not surface) or _apart(middle, reach, a, b) >= far:
-                continue
-            distance, overlap = pair_distance(layout, T, w, a, b, room, near, 0.0 if layout.joined[k] else far)
-            inside = overlap or (surface and distance < 0)
-            if distance < best and (inside or turn >= 0) and not (layout.joined[k] and distance >= 0 and not overlap):
-                best, at = distance, k
-        smallest[n], pair[n], deep[n] = best, at, inside
+        smallest[n], at, deep[n] = _smallest(layout, q[n], at, placed, room, near)
+        pair[n] = at
+
+
+@borrowing_kernel
+def _smallest(
+    layout: Layout, q: Reals, before: int, placed: tuple[Reals, Reals, Reals], room: Reals, near: Reals
+) -> tuple[float, int, bool]:
+    """As :func:`measure` for one pose (n,); ``before`` is the pair that is measured first, or -1."""
+    T, w, middle = placed
+    reach, first, second = layout.reach, layout.first, layout.second
+    root, count = layout.trees.root, len(first)
+    start, best, at, inside = max(before, 0), np.inf, -1, False
+    place(layout, q, T, w, middle)
+    for turn in range(-count, count):
+        k = (start + turn) % count
+        a, b = first[k], second[k]
+        surface, far = root[a] >= 0 or root[b] >= 0, 0.0 if turn < 0 else best
+        if inside or (turn < 0 and not surface) or _apart(middle, reach, a, b) >= far:
+            continue
+        distance, overlap = pair_distance(layout, T, w, a, b, room, near, 0.0 if layout.joined[k] else far)
+        inside = overlap or (surface and distance < 0)
+        if distance < best and (inside or turn >= 0) and not (layout.joined[k] and distance >= 0 and not overlap):
+            best, at = distance, k
+    return best, at, inside
+
+
+@kernel
+def keeps_margin(layout: Layout, start: Reals, end: Reals, margin: float, swing: float, least: float) -> bool:
+    """Whether a straight move of the joints keeps a margin, by conservative advancement.
+
+    Parameters
+    ----------
+    start, end : (n,), rad or m
+    margin : m, between all pairs that no joint holds together
+    swing : m, by which no point of the arm moves more in all of it
+    least : share of the move, by which it is advanced at least: a thinner violation may pass
+
+    Returns
+    -------
+    keeps : where it mostly does not is tried first
+    """
+    room, near, placed, at = np.empty((ROOM, 3)), np.zeros((2, 3)), unplaced(layout), -1
+    share, tried = 0.0, 0 if swing > 0 else LIKELY
+    while tried < LIKELY or share < 1.0:
+        now = (0.5, 0.25, 0.75)[tried] if tried < LIKELY else share
+        clear, at, inside = _smallest(layout, start + now * (end - start), at, placed, room, near)
+        if inside or clear < margin:
+            return False
+        if tried >= LIKELY:
+            share += max((clear - margin) / swing, least) if swing > 0 else 1.0
+        tried += 1
+    clear, at, inside = _smallest(layout, end, at, placed, room, near)
+    return not (inside or clear < margin)
 
 
 @kernel

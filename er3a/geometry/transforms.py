@@ -240,7 +240,8 @@ def log_rotation(R: Reals) -> Reals:
     -------
     v : (..., 3), rad, of length pi at most
     """
-    v: Reals = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-1])
+    turns = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3), assume_valid=True)
+    v: Reals = turns.as_rotvec().reshape(R.shape[:-1])
     return v
 
 

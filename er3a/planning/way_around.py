@@ -27,6 +27,7 @@ import numpy as np
 from er3a.by_value import by_identity
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.collision.distances import keeps_margin
 from er3a.collision.shapes import link_frames
 from er3a.errors import PathError
 from er3a.finding import Finding, fact, is_one
@@ -52,7 +53,6 @@ STILL = 1e-9  # rad
 SPARE = 0.25  # of the clearance at the ends, to within which that of the motion is found
 STREAM = 17
 MAX_PAIRS = 4  # of start and end, the nearest: each failed search takes all its rounds
-LIKELY = (0.5, 0.25, 0.75)  # shares of a move at which it is tried first
 
 
 @by_identity
@@ -183,19 +183,6 @@ class _Moves:
         lengths = np.linalg.norm(np.diff(T[1:, :3, 3], axis=0), axis=1)
         self.levers = reach + np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
 
-    def clear(self, q: Reals) -> float:
-        """Smallest distance of an arm from itself and the scene.
-
-        Parameters
-        ----------
-        q : (n,), rad or m
-
-        Returns
-        -------
-        distance : m, negative by the depth of overlap
-        """
-        return float(self.bodies.min_distance(q[None])[0][0])
-
     def free(self, a: Reals, b: Reals) -> bool:
         """Whether the straight joint move between two arms keeps the margin, by conservative advancement.
 
@@ -208,16 +195,8 @@ class _Moves:
         free : steps are no shorter than ``SHORTEST_STEP``, so that a thin violation may pass; the final proof sees it
         """
         turn, of_rows = np.abs(b - a), np.abs(self.coupling @ (b - a))
-        swing, smallest = float(self.levers @ of_rows), SHORTEST_STEP / max(float(turn.max()), SHORTEST_STEP)
-        if any(self.clear(a + share * (b - a)) < self.margin for share in LIKELY):
-            return False
-        share = 0.0
-        while share < 1.0:
-            spare = self.clear(a + share * (b - a)) - self.margin
-            if spare < 0:
-                return False
-            share += max(spare / swing, smallest) if swing > 0 else 1.0
-        return self.clear(b) >= self.margin
+        least = SHORTEST_STEP / max(float(turn.max()), SHORTEST_STEP)
+        return bool(keeps_margin(self.bodies.layout, a, b, self.margin, float(self.levers @ of_rows), least))
 
 
 def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: int) -> Any:
@@ -246,7 +225,7 @@ def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: 
             """Whether the straight move between two states of OMPL keeps the margin."""
             return moves.free(joints(first), joints(second))
 
-    info.setStateValidityChecker(lambda state: moves.clear(joints(state)) >= moves.margin)
+    info.setStateValidityChecker(lambda state: moves.free(joints(state), joints(state)))
     validator = Advancement(info)
     info.setMotionValidator(validator)
     info.setup()

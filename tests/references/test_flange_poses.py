@@ -122,5 +122,6 @@ def test_the_last_offset_and_alpha_are_settled_or_contradicted_like_others(tmp_p
     assert diagnosis.explains
     for column, corrected in (("offset", diagnosis.corrected), ("alpha", right)):
         robot = right.replace(**{column: wrong[column]})
-        evidence = evidence_of(robot, found.references, found.documents, only=names, corrected=[corrected])
-        assert evidence[f"{column}7"].status == "contradicted"
+        name = f"{column}7"
+        evidence = evidence_of(robot, found.references, found.documents, only=[name], corrected=[corrected])
+        assert evidence[name].status == "contradicted"
