@@ -201,26 +201,23 @@ def _of_toolbox(function: str, words: Words, cells: Cells) -> Cells:
     said = " ".join([function, *words])
     slides = "prismatic" in said or cells.get("sigma", "0") in ("1", "1.0")
     slides |= function == "link" and "theta" in cells and "d" not in cells
-    offset = cells.pop("offset", "0")
-    row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
-    row |= {
-        "offset": offset,
-        "type": "revolute",
-        "convention": "modified" if "mod" in said or "mdh" in said else "standard",
-    }
+    row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha", "offset")}
+    row |= {"type": "revolute", "convention": "modified" if "mod" in said or "mdh" in said else "standard"}
     if slides:  # its own d is no part of the transform
-        row |= {"d": offset, "offset": "", "type": "prismatic"}
+        row |= {"d": "0", "type": "prismatic"}
     return row | {"direction": "-1"} if "flip" in words else row
 
 
 def _assigned(code: Code, rows: list[_Link]) -> None:
-    """Carry out what is set after a link was made: ``L(2).offset = -pi/2``."""
-    pattern = r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\s*=(?!=)\s*([^;\n]+)"
+    """Carry out what is set after a link was made: ``L(2).offset = -pi/2``, or ``robot.offset(2) = -pi/2``."""
+    pattern = r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\b([^=;\n,)]*\)?)\s*=(?!=)\s*([^;\n]+)"
     for found in re.finditer(pattern, code.text) if rows else ():
-        name = f"{found[1]}.{found[2]}"
+        name, number = f"{found[1]}.{found[2]}", found[3].strip("() ")
         given = [(row, key) for row in rows for key, cell in row.cells.items() if name in (cell, f"{row.name}.{key}")]
+        if found[3].strip():
+            given = [(rows[int(number) - 1], found[2])] if number.isdigit() and 0 < int(number) <= len(rows) else []
         for row, key in given:
-            row.cells[key] = found[3].strip()
+            row.cells[key] = found[4].strip()
         if not given:
             code.refuse(found.start(), name, "is set for a link that is not found", "Write it into the link's call")
 

@@ -409,6 +409,7 @@ class _Table:
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.lengths = self._said_unit(text)
         self.kinds = self._kinds()
+        self._offset_slides()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             raise InputError(path, "types of joints", f"'{kind[0]}' is no column of the table", "Add a column of types")
         self.columns: dict[str, Words] = {"joint": self._joints()}
@@ -632,6 +633,14 @@ class _Table:
                 "Write q1, q2, ... where a joint turns, and one row for what is fixed",
             )
         return found
+
+    def _offset_slides(self) -> None:
+        """Make the offset of a joint that slides, a length, part of its d."""
+        for row, (d, offset, kind) in enumerate(zip(self._of("d"), self._of("offset"), self.kinds)):
+            unit = offset and (offset.unit or self.headings[self.column["offset"]].unit or offset.variables)
+            if offset and kind == "prismatic" and not unit:
+                self.amounts["d"][row] = replace(d, number=d.number + offset.number) if d else offset
+                self.amounts["offset"][row] = None
 
     def _of(self, quantity: str) -> list[CellAmount | None]:
         return self.amounts.get(quantity) or [None] * len(self.rows)

@@ -423,6 +423,12 @@ def test_rows_without_a_variable_are_base_and_flange_and_sliding_joints_keep_the
     assert (content.flange or content.tool).xyz_mm[2] == pytest.approx(60)
 
 
+def test_the_offset_of_a_joint_that_slides_is_part_of_its_d(tmp_path):
+    content, _ = read(tmp_path, "%Robot=[d v a alpha offset;\nR = [0 q1 .4 pi/2 pi/2;\n     .1+q2 0 0 0 .5];\n")
+    assert [row.d_mm for row in content.dh.rows] == pytest.approx([0, 600])
+    assert [zero.offset_deg for zero in content.zero.rows] == [pytest.approx(90), None]
+
+
 def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
     values = "d1 = 0.38; a1 = 0; alpha1 = 0;\nd2 = 0; a2 = 0.35; alpha2 = -pi/2;\n"
     content, _ = read(
@@ -449,6 +455,7 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "| theta | d | a | alpha\nJ0 | t0 | 290 | 0 | -90°\nJ1 | t1-90 | 0 | 270 | 0°\n",
         "| i | a [mm] | α [°] | d [mm] | θ |\n|1|0|-90|290[mm]|$q_1^*$|\n|2|270|0|0|`q2` - β (variable)|\n\n"
         "**Note:** `β = 90°`.",
+        "L(1)=Link([0 0.29 0 -pi/2]);\nL(2)=Link([0 0 0.27 0]);\nr = SerialLink(L);\nr.offset(2)=-pi/2;",
     ],
 )
 def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
