@@ -208,10 +208,19 @@ def _of_toolbox(function: str, words: Words, cells: Cells) -> Cells:
     return row | {"direction": "-1"} if "flip" in words else row
 
 
+_SET = re.compile(
+    r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\b"
+    r"([^=;\n,)]*\)?)\s*=(?!=)\s*([^;\n]+)"  # what is between: an index of a joint
+)
+
+
 def _assigned(code: Code, rows: list[_Link]) -> None:
-    """Carry out what is set after a link was made: ``L(2).offset = -pi/2``, or ``robot.offset(2) = -pi/2``."""
-    pattern = r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\b([^=;\n,)]*\)?)\s*=(?!=)\s*([^;\n]+)"
-    for found in re.finditer(pattern, code.text) if rows else ():
+    """Carry out what is set after a link was made: ``L(2).offset``, ``robot.offset(2)``, ``robot.links(2).offset``."""
+    text = re.sub(r"\.links(\(\d+\))\.(\w+)", r".\2\1      ", code.text)  # as long as it was
+    pattern = (
+        r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\b([^=;\n,)]*\)?)\s*=(?!=)\s*([^;\n]+)"
+    )
+    for found in re.finditer(pattern, text) if rows else ():
         name, number = f"{found[1]}.{found[2]}", found[3].strip("() ")
         given = [(row, key) for row in rows for key, cell in row.cells.items() if name in (cell, f"{row.name}.{key}")]
         if found[3].strip():

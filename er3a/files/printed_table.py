@@ -60,14 +60,16 @@ _KINDS = words_of(
 )
 _KIND_ELSEWHERE = re.compile(
     r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?\w*[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b|"
-    r"(?:types?|sigma)\s*=\s*[\[{(][^\n]*(?:prismatic|\b1\b))",
+    r"(?:types?|sigma)\s*=\s*[\[{(][^\n]*(?:prismatic|\b1\b)|[%#/][^\n]*(?:\bprismatic\b|平动|移动关节))",
     re.I,
 )
 """A joint that slides, said outside the table."""
 _LISTS = re.compile(
-    r"\b(\w*(?:offsets?|types?|sigma))\s*(?:\[\d*\])?\s*[:=]\s*[\w.(]*[\[{]([^\[\]{}]*[1-9a-z][^\[\]{}]*)[\]}]", re.I
+    r"\b(\w*(?:offsets?|types?|sigma|signs?|directions?|dirs?|polarity|inv_joints?))\s*(?:\[\d*\])?\s*[:=]"
+    r"\s*[\w.(]*[\[{]([^\[\]{}]*[1-9a-z][^\[\]{}]*)[\]}]",
+    re.I,
 )
-"""A list of offsets, or of types."""
+"""A list of offsets, of types, or of directions."""
 _TYPES = {*words_of("r p revolute prismatic fixed")}
 _JOINTS = re.compile(r"Joint\([^;\n]*[\"'](revolute|prismatic|fixed)[\"']")
 SIGNS = {
@@ -353,22 +355,28 @@ def _turned(grid: Grid) -> list[Grid]:
 
 
 def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
-    """A program's table with a separate list of types as a column, and one of offsets if no theta is in the table."""
+    """A program's table with a separate list of types as a column, and one of offsets if no theta is in the table; a
+    list of directions is asked back, as an offset may be added before or after."""
     (line, header), *rows = grid
     found = [(each[1], re.findall(r"[^,;\s\"']+", each[2])) for each in _LISTS.finditer(text)]
     for name, cells in [("type", _JOINTS.findall(text)), *found]:
         quantities, said = quantities_of(header), {each.lower() for each in cells}
         own = "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == ["offset"])
-        of_types = "offset" not in name.lower()
-        if len(cells) != len(rows) or (("type" in header or not said <= _TYPES) if of_types else own.strip("0.")):
+        of_types, of_signs = (re.search(words, name, re.I) for words in ("type|sigma", "sign|dir|polar|inv"))
+        if of_types:
+            settled = "type" in header or not said <= _TYPES
+        else:
+            settled = "direction" in header or not said & {"-1", "-1.0"} if of_signs else bool(own.strip("0."))
+        if len(cells) != len(rows) or settled:
             continue
         of_angles = name.lower().startswith(("th", "q", "joint", "angle"))
-        if not of_types and ("theta" in quantities or not of_angles or f"- {name}" in text):
+        if of_signs or (not of_types and ("theta" in quantities or not of_angles or f"- {name}" in text)):
+            what = "directions" if of_signs else "offsets"
             raise InputError(
                 path,
                 f"line {text.count(chr(10), 0, text.index(name)) + 1}",
-                f"'{name}' may be offsets of the table's joints, and no column holds them",
-                "Add them to theta, or remove that line",
+                f"'{name}' may be {what} of the table's joints, and no column holds them",
+                "Add a column direction, or add offsets to theta, or remove that line",
             )
         header = [*header, "type" if of_types else "offset"]
         rows = [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]

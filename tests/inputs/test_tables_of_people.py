@@ -355,6 +355,9 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,72.5(2),q1\n2,270,0,0,q2\n", "is not a number"),
         ("i,a (in),α (deg),d (in),θ\n1,0,-90,23½,q1\n2,27,0,0,q2\n", "is not a number"),
         ("L = [PrismaticDH(alpha=pi/2)]\nfor i in n:\n    L.append(RevoluteDH(d=d[i], a=a[i]))\n", r"d\[i\]"),
+        ("L(1)=Link([0 0.3 0 0]);\nL(2)=Link([0 0 1 0]);\nr=SerialLink(L);\nr.offset([1 2])=[1 0];", "r.offset"),
+        ("DH = [% theta d a alpha\n0 0 0 90;%平动关节\n0 0 100 0];\n", "types of joints"),
+        ("% theta d a alpha\nDH = [0 290 0 -90\n0 0 270 0];\njoint_signs = [1 -1];\n", "directions"),
     ],
 )
 def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
@@ -456,6 +459,7 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "| i | a [mm] | α [°] | d [mm] | θ |\n|1|0|-90|290[mm]|$q_1^*$|\n|2|270|0|0|`q2` - β (variable)|\n\n"
         "**Note:** `β = 90°`.",
         "L(1)=Link([0 0.29 0 -pi/2]);\nL(2)=Link([0 0 0.27 0]);\nr = SerialLink(L);\nr.offset(2)=-pi/2;",
+        "L(1)=Link([0 0.29 0 -pi/2]);\nL(2)=Link([0 0 0.27 0]);\nr = SerialLink(L);\nr.links(2).offset=-pi/2;",
     ],
 )
 def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
