@@ -221,10 +221,13 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
         r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\b([^=;\n,)]*\)?)\s*=(?!=)\s*([^;\n]+)"
     )
     for found in re.finditer(pattern, text) if rows else ():
-        name, number = f"{found[1]}.{found[2]}", found[3].strip("() ")
-        given = [(row, key) for row in rows for key, cell in row.cells.items() if name in (cell, f"{row.name}.{key}")]
-        if found[3].strip():
-            given = [(rows[int(number) - 1], found[2])] if number.isdigit() and 0 < int(number) <= len(rows) else []
+        name, one = f"{found[1]}.{found[2]}", f"{found[2]}{found[3]}".rstrip()
+        given = [
+            (row, key)
+            for k, row in enumerate(rows, 1)
+            for key, cell in row.cells.items()
+            if one == f"{key}({k})" or (one == found[2] and name in (cell, f"{row.name}.{key}"))
+        ]
         for row, key in given:
             row.cells[key] = found[4].strip()
         if not given:

@@ -177,8 +177,6 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
         of_link = quantities["alpha" if place_of(name) in ("alpha", "a") else "d"]
         first = min(entries) if len(entries) == len(of_link) else min(of_link)
         gaps = {*range(first, max(entries) + 1)} - {*entries}
-        if gaps and (mark != ":" or place_of(name) != "theta"):
-            code.refuse(place, f"{name}{min(gaps)}", "is missing", "Give one for each joint")
         cells |= {k: f"{name}{k}" for k in gaps}  # what is not replaced stays a variable
         before = "(i-1)" if min(of_link) < max(map(min, found.values())) else ""
         yield name + before, [cells[k] for k in sorted(cells)], code.line(place), mark

@@ -89,7 +89,7 @@ class Code:
 
 def _entry_by_entry(text: str) -> str:
     """A text whose statements ``T[0][1] = ...``, ``DH(1).a = ...`` are one that has all entries."""
-    found: dict[str, dict[int, Cells]] = {}
+    found, whole = dict[str, dict[int, Cells]](), Cells()
     for _, name, row, key, value in _ENTRY.findall(text):
         found.setdefault(name, {}).setdefault(int(row), {})[key] = value.strip()
     for name, rows in found.items():
@@ -97,13 +97,9 @@ def _entry_by_entry(text: str) -> str:
         of_numbers = all("".join(row).isdigit() and [*row] == sorted(row) for row in rows.values())
         same = len({*map(len, made)}) == 1 and len(made[0]) > 2 and (of_numbers or all(map(is_row, rows.values())))
         if same and 1 < len(rows) == max(rows) - min(rows) + 1:
-            entries = [each for each in _ENTRY.finditer(text) if each[2] == name]
-            for each in entries[:0:-1]:
-                text = text[: each.start()] + each[1] + text[each.end() :]
-            first = entries[0]
-            statement = f"{first[1]}{name} = {made}".replace("'", "")
-            text = text[: first.start()] + statement + text[first.end() :]
-    return text
+            whole[name] = f"{name} = {made}".replace("'", "")
+    first = dict(whole)
+    return _ENTRY.sub(lambda each: each[1] + first.pop(each[2], "") if each[2] in whole else each[0], text)
 
 
 def row_cells(text: str) -> Words:
