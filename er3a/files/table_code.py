@@ -142,12 +142,8 @@ def _listed(code: Code) -> Grid:
 
 
 def _titled(code: Code, rows: Grid, labels: Words, before: str = "") -> Grid:
-    """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
+    """A matrix below the names of its columns, [] if it has none; with the labels of its rows, if each has one."""
     header = order_of(code, rows, before) or _symbols(rows)
-    firsts = [cells[0] for _, cells in rows]
-    if not header and len(rows[0][1]) > 3 and all(re.fullmatch(r"[A-Za-z][\w -]*", first) for first in firsts):
-        rows, labels = [(line, cells[1:]) for line, cells in rows], firsts  # names of the joints
-        header = order_of(code, rows, before)
     labelled = all(re.search(r"[^\W\d_]|^\d+$", each) for each in labels) and not all(map(heading_of, labels))
     if header and "joint" not in header and labelled:
         return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]

@@ -11,7 +11,7 @@ from er3a.files.arithmetic import UNITS, plain, words_of
 
 _JOINT = words_of(
     "joint joints joint# jointi jointno jointno. jointnumber link links link# linki linkno linkno. linknumber axis "
-    "i j n no no. # frame kinematics gelenk achse articulation articulación eslabón junta ジョイント "
+    "i j n no no. # name frame kinematics gelenk achse articulation articulación eslabón junta ジョイント "
     "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
