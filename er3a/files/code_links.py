@@ -217,10 +217,7 @@ _SET = re.compile(
 def _assigned(code: Code, rows: list[_Link]) -> None:
     """Carry out what is set after a link was made: ``L(2).offset``, ``robot.offset(2)``, ``robot.links(2).offset``."""
     text = re.sub(r"\.links(\(\d+\))\.(\w+)", r".\2\1      ", code.text)  # as long as it was
-    pattern = (
-        r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\b([^=;\n,)]*\)?)\s*=(?!=)\s*([^;\n]+)"
-    )
-    for found in re.finditer(pattern, text) if rows else ():
+    for found in _SET.finditer(text) if rows else ():
         name, one = f"{found[1]}.{found[2]}", f"{found[2]}{found[3]}".rstrip()
         given = [
             (row, key)
