@@ -47,8 +47,7 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.motion import limits_of, planned_entries, planning_of
 from er3a.pipeline.stages.trajectory.page.played import events, faults, motions
 from er3a.pipeline.stages.trajectory.page.record import record
-from er3a.pipeline.stages.trajectory.page.report import answer_of, report, strategies_shown
-from er3a.pipeline.stages.workspace.page.tray import Meeting
+from er3a.pipeline.stages.trajectory.page.report import report, strategies_shown
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach import panel
 from er3a.pipeline.teach.panel import write_teach_page
@@ -632,32 +631,6 @@ def test_a_table_and_a_program_at_the_slower_pace_that_is_advised_keep_the_limit
         longer = float(said[2])
     assert not at(longer).too_fast
     assert at(0.97 * longer).too_fast
-
-
-def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, stored, tmp_path, monkeypatch):
-    """In the section's answer, at its programs and in their heads, and in the player; it is no fix, so that its
-    path is listed with those that may not run, and with its own fault."""
-    met = {"line_limits, repaired": Meeting(0.21, "link 4")}
-    monkeypatch.setattr("er3a.pipeline.stages.trajectory.page.report.met_in_tray", lambda study, stored: met)
-    report(study, replace(stored["er3_600"], table="pass"), tmp_path / "page.html")
-    page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert page.count('data-t="0.21">meets the tray at 0.21 s: link 4</a>') == 2
-    assert "<small>meets the tray at 0.21 s: link 4</small>" not in page
-    found = stored["er3_600"].results
-    wrong = {fault.name: fault for fault in faults(found) if fault.name == "line_limits"}
-    assert answer_of(found.summary, wrong, ()).fix
-    hindered = answer_of(found.summary, wrong, (), met)
-    assert hindered.fix is None
-    judged, repairable = hindered.groups[:2]
-    assert [(row.name, row.note, row.fix) for row in judged.rows if row.name in wrong] == [
-        ("line_limits", wrong["line_limits"].verdict, None)
-    ]
-    assert not repairable.rows
-    assert page.count('"text": "meets the tray at 0.21 s: link 4"') == 1
-    for file, packed in re.findall(r'download="([^"]+)" data-packed="([^"]+)"', page):
-        text = gzip.decompress(base64.b64decode(packed)).decode()
-        told = "er3a: meets the tray that the workspace page places at 0.21 s" in text
-        assert told == (file.startswith("line_limits_repaired") and not file.endswith((".dat", ".var")))
 
 
 def test_a_collision_paints_the_pair_that_its_text_names_and_its_safe_end_is_said(study, results):

@@ -30,7 +30,6 @@ from er3a.pipeline.stages.programs.page.played import (
     when,
     worst_first,
 )
-from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, ListRow, judged, may_run
 from er3a.pipeline.viewing.page import render_stage
@@ -56,8 +55,6 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         programs_answer(robot, results),
         sections=sections,
-        entered=None if stored.withheld else in_tray(study, stored),
-        compared_with_tray=compared_with_tray,
         faults={fault.name: fault for fault in wrong},
         player=player(robot, played, scene, opened=opened(wrong)),
         bodies=[each.name for each in scene.solids] if scene else [],

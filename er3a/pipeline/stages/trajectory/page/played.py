@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -50,30 +50,18 @@ SINGULAR_AXES = {"wrist": (4, 6), "elbow": (2, 3), "shoulder": (1,)}  # rows of 
 RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
 
 
-def motions(
-    robot: Robot,
-    results: model.TrajectoryResults,
-    more: Mapping[str, PlayedEvent] | None = None,
-    scene: Scene | None = None,
-) -> list[PlayedMotion]:
+def motions(robot: Robot, results: model.TrajectoryResults, scene: Scene | None = None) -> list[PlayedMotion]:
     """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it.
 
-    Parameters
-    ----------
-    more : an event of motions, by their names
-    scene : to which narrow gaps are drawn
+    ``scene``: to which narrow gaps are drawn.
     """
-
-    def added(name: str) -> list[PlayedEvent]:
-        return [more[name]] if more and name in more else []
-
     checks, avoidance, motions = results.checks, results.avoidance, []
     for path in worst_first(results.summary.paths):
         whole = checks.take(checks.path == path.name)
         rows = whole.take(whole.reachable)
         near = near_assumed(path, results.summary)
         text = say(near) if near else path_text(path)
-        seen = [*events(path), *_near_events(path, near, results.clearance), *added(path.name)]
+        seen = [*events(path), *_near_events(path, near, results.clearance)]
         if path.verdict == "safe" and not near:
             seen += _nearest(path.clearance)
         seen += safe_end(path, results.clearance)
@@ -87,7 +75,7 @@ def motions(
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
             text = repair_lead(path, slowed(path, rows, repair))
             q = meant(robot, repair.q_deg)
-            seen = [*added(repaired(path)), *_nearest(path.chosen.motion.clearance if path.chosen.motion else None)]
+            seen = _nearest(path.chosen.motion.clearance if path.chosen.motion else None)
             motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, seen))
     return motions
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from er3a.comparison.compare import shift_between
 from er3a.kinematics.forward import forward
-from er3a.pipeline.language import own_title, tr, using, with_unit
+from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
@@ -23,7 +23,7 @@ from er3a.pipeline.messages.trajectory import (
     strategy_text,
     strategy_word,
 )
-from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, opened, row_of
+from er3a.pipeline.player.motions import Fault, PlayedMotion, opened, row_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -40,7 +40,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 )
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
-from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, found_by, linked, met_in_tray
+from er3a.pipeline.stages.workspace.page.tray import found_by
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, judged, may_run
 from er3a.pipeline.viewing.conditions import program_head
@@ -63,19 +63,17 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
     paths, contradicted = worst_first(summary.paths), stored.withheld
     lines = program_head(stored.validated, summary.checked, summary.assumed)
-    met = None if contradicted else met_in_tray(study, stored)
     wrong = {} if contradicted else _by_name(results)
-    trays = {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in (met or {}).items()}
-    played, names = motions(robot, results, trays, scene), [path.name for path in paths]
+    played, names = motions(robot, results, scene), [path.name for path in paths]
     for i, path in enumerate(() if contradicted else paths):
         rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count))
-        links = _programs(path, files, lines, met or {})
+        links = _programs(files, lines)
         drawn = path_picture(path, _drawn(path, rows), whole_sentence(path_text(path))) if i < count else None
         over_time = _over_time(path, results) if i < count else []
         sections.append({**_section(path, drawn, links, summary), "over_time": over_time})
     answer, shown = both_arms(study, stored, [each for each in played if each.name in names]) or (
-        answer_of(summary, wrong, played, met),
+        answer_of(summary, wrong, played),
         {"player": player(robot, played, scene, opened=opened(wrong.values()))},
     )
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
@@ -85,8 +83,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         output,
         answer,
         sections=sections,
-        entered=linked(met),
-        compared_with_tray=compared_with_tray,
         faults=wrong,
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         assumed=assumed,
@@ -108,26 +104,15 @@ def _by_name(results: model.TrajectoryResults) -> dict[str, Fault]:
     return {fault.name: fault for fault in sorted(faults(results), key=lambda each: (each.meant, *known[each.name]))}
 
 
-def answer_of(
-    summary: model.TrajectorySummary,
-    wrong: Mapping[str, Fault],
-    played: Sequence[PlayedMotion],
-    met: Mapping[str, Meeting] | None = None,
-) -> Answer:
-    """How many paths may be run, each with its bar over time, and what to do about the first of the others.
-
-    ``met``: when motions meet the tray, by their names; a repair that does is not what to do.
-    """
-    met = met or {}
+def answer_of(summary: model.TrajectorySummary, wrong: Mapping[str, Fault], played: Sequence[PlayedMotion]) -> Answer:
+    """How many paths may be run, each with its bar over time, and what to do about the first of the others."""
     motions, known = {motion.name: motion for motion in played}, {path.name: path for path in summary.paths}
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
-    hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
     faulty, others = paths[: len(wrong)], paths[len(wrong) :]
     fault_rows, repairable = list[ListRow](), list[ListRow]()
     for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
-        hinders = path.name in hindered
-        (repairable if path.chosen and not hinders else fault_rows).append(replace(row, fix=None) if hinders else row)
+        (repairable if path.chosen else fault_rows).append(row)
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [replace(_sound_row(path), mark="fail", note=as_expected(path)) for path in others if path not in sound]
     groups = judged([*unlike, *fault_rows, *map(_sound_row, sound)], repairable)
@@ -149,19 +134,13 @@ def _sound_row(path: model.PathSummary) -> ListRow:
     return ListRow("pass", path.name, note, f"#{path.name}", (path.name, least.t_s if least else 0.0), 1.0)
 
 
-def _programs(
-    path: model.PathSummary, rows: model.ProgramFiles, head: Sequence[str], met: Mapping[str, Meeting]
-) -> list[dict[str, Any]]:
-    """The files to save, each with further lines at the beginning of its head: ``head``, and in English when it meets
-    the tray; ``met``: by names of motions."""
+def _programs(rows: model.ProgramFiles, head: Sequence[str]) -> list[dict[str, Any]]:
+    """The files to save, each with the lines ``head`` at the beginning of its head."""
     texts = zip(rows.file.tolist(), rows.text.tolist(), rows.assumed_speed.tolist())
-    found = [dict(file=file, text=text, empty=not text, assumed=speed) for file, text, speed in texts]
-    for each in found:
-        meeting = met.get(repaired(path) if _repairs(path, each) else path.name)
-        with using("en"):
-            met_at = meeting and [tr("meets the tray that the workspace page places at {t:.2f} s", t=meeting.t)]
-        each["packed"] = packed_text(with_head_lines(each.pop("text"), [*head, *(met_at or ())]))
-    return found
+    return [
+        dict(file=file, packed=packed_text(with_head_lines(text, head)), empty=not text, assumed=speed)
+        for file, text, speed in texts
+    ]
 
 
 def _section(

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -16,9 +14,8 @@ from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.messages.say import bracketed, joined, say
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.workspace import reached_text, run_again_text, stand_text
-from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Placing
 from er3a.pipeline.stages.workspace.page.workspace_figures import slide_names
@@ -38,32 +35,10 @@ def tray_rows(
     reached = page.whole_sentence(reached_text(placement, served))
     return [
         (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
-        (tr("Motions"), _hindered(placing)),
+        (tr("Motions"), page.whole_sentence(placing.hindrance)),
         (tr("Payload there"), payload),
         (tr("What to do first"), run_again_text(results.summary)),
     ]
-
-
-def _hindered(placing: Placing) -> Markup:
-    """Of which motions the tray is in the way, each with a link to the moment; which others meet it; then what was
-    compared."""
-    here, hindered = placing.tried[0], placing.hindered(placing.tried[0])
-    named, others = list[Markup](), list[Markup]()
-    for stage, met in here.met.items():
-        for name, each in met.items():
-            link = Markup(bracketed('<a href="{}">{}</a>', "{}")).format(
-                address_of(stage, name, each.t, "player"), page.breakable(name), each.body
-            )
-            (named if name in hindered.get(stage, ()) else others).append(link)
-    first = page.whole_sentence(placing.hindrance)
-    texts = [escape(first), *_sentence(named), *_sentence(others, tr("Others that meet it")), escape(placing.compared)]
-    return Markup(" ").join(texts)
-
-
-def _sentence(links: Sequence[Markup], about: str = "") -> list[Markup]:
-    """Links as a sentence; none where there are none."""
-    lead = escape(about + tr(": ") if about else "")
-    return [lead + Markup(tr(", ")).join(links) + tr(". ").strip()] if links else []
 
 
 SHADES = "viridis_r"

@@ -111,10 +111,9 @@ def _tray_as_rows(placing: Placing | None, settled: bool) -> list[ListRow]:
         return [ListRow("caution", tr("nowhere"), tr("no place fits"), "#placement")]
     rows = []
     for number_, tried in enumerate(placing.tried, start=1):
-        blocked = sum(map(len, placing.hindered(tried).values()))
-        note = tr("blocks {count} of {all} motions", count=blocked, all=placing.passing)
+        note = tr("blocks {count} of {all} motions", count=len(tried.hindered), all=placing.passing or 0)
         rows.append(
-            ListRow("pass" if settled and not blocked else "caution", tried.tray.name, note, f"#tray-{number_}")
+            ListRow("pass" if settled and not tried.hindered else "caution", tried.tray.name, note, f"#tray-{number_}")
         )
     return rows
 

@@ -3,33 +3,27 @@ way of the fewest."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
-from er3a.by_value import by_identity, frozen
-from er3a.collision.along import STEP, first_overlap
-from er3a.collision.pairs import names_of
+from er3a.by_value import by_identity
+from er3a.collision.along import first_overlap
 from er3a.collision.scene import Box, Scene
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import as_text, own_title, tr
 from er3a.pipeline.messages.say import joined
-from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.messages.workspace import millimetres
-from er3a.pipeline.player.player import moment
 from er3a.pipeline.results import AbsentResults, Stored, is_computed, read_stage
 from er3a.pipeline.stages.expectations import unmet_expectations
-from er3a.pipeline.stages.inverse.model import TargetRows
 from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
 from er3a.pipeline.stages.programs.page.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.page.played import faults as path_faults
-from er3a.pipeline.stages.trajectory.page.played import repaired
 from er3a.pipeline.stages.vision.model import ObjectResult, VisionResults
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary, TaskSummary
 from er3a.pipeline.study import Study
@@ -153,24 +147,6 @@ class StoredMotion:
     q: Reals
     points: Reals
 
-    @property
-    def whole(self) -> bool:
-        """Whether the arm is known all along."""
-        return len(self.t) > 1 and bool(np.isfinite(self.points).all())
-
-
-@frozen
-class Meeting:
-    """When a motion meets the tray first (s), and with what."""
-
-    t: float
-    body: str
-
-    @property
-    def text(self) -> str:
-        """When, and with what."""
-        return tr("meets the tray at {t:.2f} s: {body}", t=self.t, body=self.body)
-
 
 def trays(workspace: Any) -> list[Tray]:
     """The tray at its best place, then at the best ones on or over other surfaces; empty if these results put none."""
@@ -187,7 +163,7 @@ def trays(workspace: Any) -> list[Tray]:
 
 
 def stored_motions(results: object, robot: Robot) -> Iterator[StoredMotion]:
-    """The motions of a stage's results: paths and what repairs them, programs, grasps; of others none."""
+    """The motions of a stage's results: paths, programs, grasps; of others none."""
     if isinstance(results, VisionResults):
         for each in results.summary.objects:
             if each.outcome == "grasped":
@@ -202,24 +178,16 @@ def stored_motions(results: object, robot: Robot) -> Iterator[StoredMotion]:
         for path in results.summary.paths:
             rows = results.checks.take(results.checks.path == path.name)
             yield StoredMotion(path.name, rows.t_s, meant(robot, rows.q_deg), rows.xyz_mm / 1000)
-            if path.chosen:
-                own = (results.avoidance.path == path.name) & (results.avoidance.strategy == path.strategy)
-                repair = results.avoidance.take(own)
-                yield StoredMotion(repaired(path), repair.t_s, meant(robot, repair.q_deg), repair.xyz_mm / 1000)
 
 
-def met(robot: Robot, tray: Tray, carried: Scene | None, motions: Iterable[StoredMotion]) -> dict[str, Meeting]:
-    """Of each motion by name when its tool point or a body of the arm first meets a tray or its stand, if it does."""
-    found, scene = dict[str, Meeting](), tray.scene(carried)
-    for each in motions:
-        at = first_inside(each.t, each.points, *tray.corners)
-        meetings = [] if at is None else [Meeting(at, tr("tool point"))]
-        if len(each.t) and (overlap := first_overlap(robot, scene, each.t, each.q)):
-            first, _ = names_of(overlap[1])
-            meetings.append(Meeting(overlap[0], body_word(first)))
-        if meetings:
-            found[each.name] = min(meetings, key=lambda meeting: meeting.t)
-    return found
+def met(robot: Robot, tray: Tray, carried: Scene | None, motions: Iterable[StoredMotion]) -> list[str]:
+    """Names of the motions of which the tool point or a body of the arm meets a tray or its stand."""
+    scene = tray.scene(carried)
+    return [
+        each.name
+        for each in motions
+        if len(each.t) and (enters(each.points, *tray.corners) or first_overlap(robot, scene, each.t, each.q))
+    ]
 
 
 def scene_of(study: Study, robot: str, stage: str) -> Scene | None:
@@ -229,10 +197,10 @@ def scene_of(study: Study, robot: str, stage: str) -> Scene | None:
 
 @by_identity
 class Tried:
-    """A tray at a place, and of each stage's motions by name when they meet it or its stand first."""
+    """A tray at a place, and the names of the motions that pass without it, but meet it or its stand there."""
 
     tray: Tray
-    met: Mapping[str, Mapping[str, Meeting]]
+    hindered: Sequence[str]
 
 
 @by_identity
@@ -243,15 +211,11 @@ class Placing:
     Attributes
     ----------
     tried : that place, then the others
-    sound : per stage, in the order of ``met``, the names of motions that pass without the tray
-    targets : those with a solution, whose tool points lie in the tray or its stand
-    unseen : names of motions that are not known, or not all
+    passing : how many motions pass without the tray; None where there are none to compare with it
     """
 
-    tried: tuple[Tried, ...]
-    sound: Mapping[str, Sequence[str]]
-    targets: tuple[str, ...]
-    unseen: tuple[str, ...]
+    tried: Sequence[Tried]
+    passing: int | None
 
     @property
     def tray(self) -> Tray:
@@ -259,46 +223,15 @@ class Placing:
         return self.tried[0].tray
 
     @property
-    def met(self) -> Mapping[str, Mapping[str, Meeting]]:
-        """What meets it there."""
-        return self.tried[0].met
-
-    @property
-    def passing(self) -> int:
-        """How many motions pass without it."""
-        return sum(len(self.sound.get(stage, ())) for stage in self.met)
-
-    def hindered(self, tried: Tried) -> dict[str, list[str]]:
-        """Of motions that pass without the tray those that meet it at a place, per stage."""
-        found = {stage: [name for name in self.sound.get(stage, ()) if name in met] for stage, met in tried.met.items()}
-        return {stage: names for stage, names in found.items() if names}
-
-    @property
     def hindrance(self) -> str:
-        """Of how many of the motions that pass it is in the way."""
-        some = sum(map(len, self.hindered(self.tried[0]).values()))
-        if not self.met:
+        """Of which of the motions that pass it is in the way."""
+        if self.passing is None:
             return tr("no path, program or grasp was compared with it")
-        if not self.passing:
-            return tr("no motion passes that it could be in the way of")
-        if not some:
-            return tr(
-                "in the way of none of the {count} motions that pass without it; nothing was planned around it",
-                count=self.passing,
-            )
-        return tr("in the way of {some} of the {count} motions that pass without it", some=some, count=self.passing)
-
-    @property
-    def compared(self) -> str:
-        """What was compared with the tray, and what of it was found; empty where nothing was."""
-        if not self.met:
-            return ""
-        said = [compared_with_tray([name for found in self.met.values() for name in found])]
-        if self.targets:
-            said.append(tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")))
-        if self.unseen:
-            said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
-        return joined(said, " ")
+        hindered = self.tried[0].hindered
+        said = tr(
+            "in the way of {some} of the {count} motions that pass without it", some=len(hindered), count=self.passing
+        )
+        return joined([said, joined(hindered, ", ")], ": ")
 
 
 def placing(
@@ -314,23 +247,17 @@ def placing(
     places = trays(stored["workspace"].results) if "workspace" in stored else []
     if not places:
         return None
-    motions = {stage: [*stored_motions(stored[stage].results, robot)] for stage in MOTIONS if stage in stored}
+    motions = {
+        stage: [each for each in stored_motions(stored[stage].results, robot) if each.name in sound.get(stage, ())]
+        for stage in MOTIONS
+        if stage in stored
+    }
     tried = [
-        Tried(tray, {stage: met(robot, tray, scenes.get(stage), each) for stage, each in motions.items()})
+        Tried(tray, sum((met(robot, tray, scenes.get(stage), each) for stage, each in motions.items()), list[str]()))
         for tray in places
     ]
-    best = min(
-        tried, key=lambda each: sum(len(found.keys() & sound.get(stage, ())) for stage, found in each.met.items())
-    )
-    unseen = [each.name for moved in motions.values() for each in moved if not each.whole]
-    for stage in motions:
-        unseen += [each.name for each in getattr(stored[stage].results.summary, "not_followed", ())]
-    low, high = (1000 * corner for corner in best.tray.corners)
-    targets = stored["inverse"].results.targets if "inverse" in stored else TargetRows.empty()
-    inside = targets.reached & np.all((low <= targets.point_mm) & (targets.point_mm <= high), axis=1)
-    return Placing(
-        (best, *(each for each in tried if each is not best)), sound, tuple(targets.target[inside]), tuple(unseen)
-    )
+    passing = sum(map(len, motions.values())) if motions else None
+    return Placing(sorted(tried, key=lambda each: len(each.hindered)), passing)
 
 
 def sound_motions(results: object) -> list[str]:
@@ -375,7 +302,7 @@ def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
     """
     if stored.withheld:
         return None
-    names = ("workspace", "inverse", *MOTIONS)
+    names = ("workspace", *MOTIONS)
     found = {name: each for name in names if (each := found_by(stored, name))}
     found[stored.stage] = stored
     if "workspace" not in found:
@@ -385,54 +312,12 @@ def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
     return placing(found, study.robot(stored.robot), scenes, sound)
 
 
-def met_in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Meeting] | None:
-    """Of each motion of a stage that meets the tray when it first does; None where no place of the tray is known."""
-    found = placing_of(study, stored)
-    return None if found is None else found.met.get(stored.stage, {})
-
-
-def in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Markup] | None:
-    """The same as links to these moments."""
-    return linked(met_in_tray(study, stored))
-
-
-def linked(met: Mapping[str, Meeting] | None) -> Mapping[str, Markup] | None:
-    """When motions meet the tray, as links to these moments of the page's player."""
-    return None if met is None else {name: moment(name, each.t, each.text) for name, each in met.items()}
-
-
-def compared_with_tray(met_it: Collection[str] | None) -> str:
-    """What a page says of motions that were compared with the tray, ``met_it`` those that do; empty for None."""
-    if met_it is None:
-        return ""
-    found = (
-        tr(
-            "“Meets the tray”: when the tool point, or a link's shape or what is carried, is first found in the tray "
-            "or its stand."
-        )
-        if met_it
-        else tr("Neither the tool point nor a link's shape nor what is carried was found in the tray or its stand.")
-    )
-    how = tr(
-        "Compared at the stored times and every {turn:.1f}° or {way:.0f} mm of a joint between them.",
-        turn=np.degrees(STEP),
-        way=1000 * STEP,
-    )
-    return joined([found, how], " ")
-
-
-def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:
-    """When a point that moves straight from each of ``points`` (n, 3) at ``t`` (n,) to the next enters a box first.
-
-    ``low``, ``high``: (3,), the box's corners. None if it never does.
-    """
+def enters(points: Reals, low: Reals, high: Reals) -> bool:
+    """Whether a point that moves straight from each of ``points`` (n, 3) to the next enters a box with these corners
+    (3,)."""
     way = np.diff(points, axis=0, append=points[-1:])
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = np.stack([low - points, high - points]) / way
     ends = np.sort(np.where(np.isnan(ends), [[[-np.inf]], [[np.inf]]], ends), axis=0)  # 0/0: along a face
-    enters, leaves = np.maximum(ends[0].max(axis=1), 0), np.minimum(ends[1].min(axis=1), 1)
-    (hits,) = np.nonzero((enters <= leaves) & np.isfinite(points + way).all(axis=1))
-    if not len(hits):
-        return None
-    row = hits[0]
-    return float(t[row] + enters[row] * (t[min(row + 1, len(t) - 1)] - t[row]))
+    inside = np.maximum(ends[0].max(axis=1), 0) <= np.minimum(ends[1].min(axis=1), 1)
+    return bool((inside & np.isfinite(points + way).all(axis=1)).any())
