@@ -27,7 +27,7 @@ def test_the_readme_tells_the_reach_within_what_is_proven(small_study):
 
 
 def test_the_readme_tells_the_mean_number_of_solutions(small_study):
-    mean = figures(small_study, "inverse")["solutions_of_random_pose"]
+    mean = figures(small_study, "validation")["solutions_of_random_pose"]
     told, most = re.search(r"([\d.]+) of (\d+) within the limits", answer("Which joint solutions")).groups()
     assert int(most) == mean.of
-    assert abs(float(told) - mean.value) < 0.05 + 1.5 * mean.uncertainty
+    assert abs(float(told) - mean.value) < 0.35  # of 200 poses

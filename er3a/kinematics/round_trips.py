@@ -9,7 +9,6 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import arm_solver, misses, parameters_of
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular
-from er3a.numerics.arrays import Integers
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move
 
@@ -34,7 +33,7 @@ class BatchRoundTrips:
     near_singular : number of poses nearer to a singularity than ``NEAR``; worst_regular : as ``worst_own``, of the
         others
     unsolved : number of poses without any solution
-    counts_within_limits : (S + 1,) int, number of poses with 0 .. S solutions within the limits, S slots of the class
+    within_limits : number of solutions within the limits, all poses together
     """
 
     poses: int
@@ -46,7 +45,7 @@ class BatchRoundTrips:
     near_singular: int
     worst_regular: float
     unsolved: int
-    counts_within_limits: Integers
+    within_limits: int
 
 
 def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> BatchRoundTrips:
@@ -81,7 +80,7 @@ def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> 
         near_singular=int(near.sum()),
         worst_regular=float(difference[~near & valid.any(axis=1)].max(initial=0.0)),
         unsolved=int((~valid.any(axis=1)).sum()),
-        counts_within_limits=np.bincount(solved.within_limits.sum(axis=1), minlength=q.shape[1] + 1),
+        within_limits=int(solved.within_limits.sum()),
     )
 
 

@@ -237,7 +237,6 @@ def test_what_is_expected_to_fail_alone_is_no_pass(study, tmp_path, stage):
         shutil.copy(file, tmp_path)
     (tmp_path / "input.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     quick = {
-        "inverse": {"round_trips": 3},
         "trajectory": {"avoidance": "slow", "programs": []},
     }
     results = (
@@ -578,9 +577,9 @@ def test_a_target_near_assumed_shapes_is_a_caution(study, tmp_path):
     scene = yaml.safe_load(Path("data/scenes/table_and_post.yaml").read_text(encoding="utf-8"))
     scene |= {"boxes": [{"name": "table", "size_mm": [500, 800, 40], "xyz_mm": [500, 0, 410]}]}
     (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene))
-    entry, few = {"targets": str(tmp_path / "targets.yaml")}, {"round_trips": 3}
+    entry = {"targets": str(tmp_path / "targets.yaml")}
     for scene_file, near in ((str(tmp_path / "scene.yaml"), ("a",)), ("data/scenes/table_and_post.yaml", ())):
-        verdict = inverse(changed(study, entry, inverse=few | {"scene": scene_file}), ROBOT).summary.verdict
+        verdict = inverse(changed(study, entry, inverse={"scene": scene_file}), ROBOT).summary.verdict
         assert verdict.shapes.near == near
         assert verdict.status == ("caution" if near else "pass")
 
@@ -650,7 +649,7 @@ def test_a_target_in_a_solid_is_no_pass(study, tmp_path):
     (tmp_path / "targets.yaml").write_text("kind: targets\ntargets:\n- {name: a, q_deg: [0, -10, -10, 0, -70, 0]}\n")
     T = forward(load_robot(tmp_path / f"{ROBOT}.yaml"), np.radians([0, -10, -10, 0, -70, 0]))
     entry = {"targets": str(tmp_path / "targets.yaml"), "file": str(tmp_path / f"{ROBOT}.yaml")}
-    few = {"round_trips": 3, "scene": str(tmp_path / "scene.yaml")}
+    few = {"scene": str(tmp_path / "scene.yaml")}
     for moved, named in ((0, ("a: part",)), (60, ())):
         ball = {"name": "part", "radius_mm": 8, "xyz_mm": (1000 * T[:3, 3] + [moved, 0, 0]).tolist()}
         held = {"boxes": [{"name": "gripper", "size_mm": [30, 30, 185], "xyz_mm": [0, 0, -107.5]}]}

@@ -279,7 +279,7 @@ def with_a_base_too_large(folder: Path) -> Study:
     study = load_study("config/small.yaml").model_dump()
     study["robots"] = {"arm": study["robots"][name] | {part: str(folder / f"{part}.yaml") for part in contents}}
     study["collision"] |= {"scene": None, "samples": 1000, "cells_across": 8, "rounds": 0}
-    study["inverse"] |= {"scene": None, "round_trips": 10}
+    study["inverse"] |= {"scene": None}
     study["workspace"] |= {"samples": 5000, "blocks": 1, "proof_cells": 200}
     study["capability"] |= {"directions": 20}
     return Study.model_validate(study)

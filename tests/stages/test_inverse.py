@@ -226,14 +226,6 @@ def test_a_singular_pose_is_taken_only_where_no_other_is(computed):
         assert ("wrist_aligned" in finding.singular) == singular[0]
 
 
-def test_round_trips_lose_nothing(computed):
-    trips = computed[1].summary.round_trips
-    assert trips.own_found == trips.poses == sum(trips.counts_within_limits) == 2000
-    assert trips.counts_within_limits[0] == 0
-    assert trips.worst_position_mm < 1e-9
-    assert trips.worst_orientation_deg < 1e-9
-
-
 def test_round_trips_tell_when_the_solver_fails(monkeypatch):
     from er3a.kinematics import round_trips as module
 

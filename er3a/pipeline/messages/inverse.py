@@ -11,8 +11,6 @@ from er3a.pipeline.messages.say import WORDS, joined, texts
 KEY_FIGURES = words(
     {
         "targets_solved": "targets solved",
-        "solutions_of_random_pose": "solutions of a random reachable pose, mean",
-        "random_poses_solved_back": "random poses solved back to their joints",
         "worst_position_residual": "worst position residual",
         "worst_orientation_residual": "worst orientation residual",
     }
@@ -25,10 +23,7 @@ NEAREST_RULE = N_(
 )
 TEXTS = texts(
     {
-        "inverse.not_reproduced": (
-            "Don't trust the solver here: residuals up to {worst_mm:.2g} mm, {worst_deg:.2g}°; joint angles of "
-            "{lost} random poses not found again."
-        ),
+        "inverse.not_reproduced": "Don't trust the solver here: residuals up to {worst_mm:.2g} mm, {worst_deg:.2g}°.",
         "unsolved_target": "{name} ({obstacle})",
         "nothing_found": "no solution found",
         "nearest_regular": "the nearest that is not singular",

@@ -42,6 +42,7 @@ KEY_FIGURES = words(
         "wrist_centre_reach": "Wrist centre: reach from axis 1",
         "flange_reach": "Flange: reach from axis 1",
         "round_trip_joint_error": "Round trips: worst joint error",
+        "solutions_of_random_pose": "solutions of a random reachable pose, mean",
     }
 )
 GRADES = words(

@@ -1,4 +1,4 @@
-"""Solve each target of the study, choose among its solutions, and try the solver on random poses."""
+"""Solve each target of the study, and choose among its solutions."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
 from er3a.finding import Amount, Finding, fact, is_one
 from er3a.geometry.transforms import quaternion_of, rpy_of
-from er3a.kinematics.by_class import arm_solver, misses
-from er3a.kinematics.classes.chain_solvers import Unsolved
+from er3a.kinematics.by_class import misses
 from er3a.kinematics.closed_form import ORIENTATION
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import Usable, neighbours
-from er3a.kinematics.round_trips import MAX_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning
 from er3a.kinematics.solutions import MANY_TARGETS, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
@@ -27,7 +25,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.results import Figure, Verdict
-from er3a.pipeline.scope import Check, Coverage, Open, coverages
+from er3a.pipeline.scope import Coverage, Open, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.covered import (
     Covered,
@@ -38,7 +36,6 @@ from er3a.pipeline.stages.covered import (
 )
 from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.inverse import model
-from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, meant, shown, unit_compared
 from er3a.robots.robot import Robot
@@ -239,11 +236,10 @@ REPRODUCED_M = 1e-9  # by which a solution may miss its target: far above the ro
 REPRODUCED_RAD = 1e-9
 STACKED = 200  # tables of targets
 MAX_ADVISED = 100  # of many targets those for which it is looked for what would help
-ROUND_TRIP_STREAM = 1
 
 
 def compute(study: Study, name: str) -> model.InverseResults:
-    """Solve the targets of a robot of the study, choose among their solutions, and try the solver on random poses.
+    """Solve the targets of a robot of the study, and choose among their solutions.
 
     Parameters
     ----------
@@ -260,7 +256,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     """
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets, robot)
-    settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
+    motion = study.section(TrajectorySettings)
     scene = study.scene(name, STAGE_NAME)
     margin = study.assumed_margin(name)
     assumed = shapes_assumed(robot, margin, {})
@@ -287,21 +283,18 @@ def compute(study: Study, name: str) -> model.InverseResults:
     smallest = {each.name: each.clearance.least_mm / 1000 for each in asked if each.clearance}
     rests_on = shapes_assumed(robot, margin, smallest)
     covered = covered_collisions(robot, bodies_of(robot, scene), scene)
-    complete = not isinstance(arm_solver(robot).chain, Unsolved)
-    random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
-    wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MAX_BY_CLASS)
-    trips = batch_round_trips(robot, random, wanted) if complete else None
-    worst = _worst_residuals(solutions, trips)
+    worst = (
+        float(solutions.position_residual_mm.max(initial=0.0)) / 1000,
+        float(np.radians(solutions.orientation_residual_deg).max(initial=0.0)),
+    )
     summary = model.InverseSummary(
-        verdict=_verdict(results, worst, trips, bool(scene and scene.solids)).with_assumed_shapes(rests_on),
-        figures=_figures(results, worst, trips),
+        verdict=_verdict(results, worst, bool(scene and scene.solids)).with_assumed_shapes(rests_on),
+        figures=_figures(results, worst),
         scene=scene.title if scene else None,
         turns=not many,
         targets=tuple(model.shown_targets(results)) if many else results,
-        round_trips=_round_trips(trips) if trips else None,
         checked=_checked(
             results,
-            trips,
             covered,
             (
                 *gaps_of_orientations(robot, ((each.name, T_of[each.name], q) for each, q in zip(asked, chosen))),
@@ -340,14 +333,11 @@ def _with_clearance(
     return tuple(targets)
 
 
-def _checked(
-    targets: Sequence[model.TargetResult], trips: BatchRoundTrips | None, seen: Covered, gaps: Iterable[Open]
-) -> tuple[Coverage, ...]:
-    """What the checks cover of the targets that are to be reached, and of random poses solved back."""
+def _checked(targets: Sequence[model.TargetResult], seen: Covered, gaps: Iterable[Open]) -> tuple[Coverage, ...]:
+    """What the checks cover of the targets that are to be reached."""
     asked = [each for each in targets if each.expect in (None, "reached")]
     all_of = len(asked), len(asked)
-    checks: dict[Check, int | tuple[int, int]] = {"reach": all_of, "limits": all_of, **seen.asked}
-    return coverages(checks | ({"round_trips": (trips.own_found, trips.poses)} if trips else {}), (*seen.gaps, *gaps))
+    return coverages({"reach": all_of, "limits": all_of, **seen.asked}, (*seen.gaps, *gaps))
 
 
 def _assumed(targets: Sequence[model.TargetResult]) -> tuple[Open, ...]:
@@ -360,17 +350,12 @@ def _assumed(targets: Sequence[model.TargetResult]) -> tuple[Open, ...]:
     return (Open("solutions_complete", names),) if names else ()
 
 
-def _verdict(
-    targets: Sequence[model.TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None, collisions: bool
-) -> Verdict:
+def _verdict(targets: Sequence[model.TargetResult], worst: tuple[float, float], collisions: bool) -> Verdict:
     position, orientation = worst
-    lost = trips.poses - trips.own_found if trips else 0
-    if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:
+    if position > REPRODUCED_M or orientation > REPRODUCED_RAD:
         return Verdict(
             "fail",
-            fact(
-                "inverse.not_reproduced", worst_mm=position * 1000, worst_deg=float(np.degrees(orientation)), lost=lost
-            ),
+            fact("inverse.not_reproduced", worst_mm=position * 1000, worst_deg=float(np.degrees(orientation))),
         )
     if unmet := unmet_expectations(targets, "reached"):
         return Verdict("fail", unmet)
@@ -392,40 +377,12 @@ def _verdict(
     return Verdict(pass_of(asked) if not unsolved else "caution" if solved else "fail", found)
 
 
-def _figures(
-    targets: Sequence[model.TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None
-) -> tuple[Figure, ...]:
+def _figures(targets: Sequence[model.TargetResult], worst: tuple[float, float]) -> tuple[Figure, ...]:
     position, orientation = worst
     asked = [target for target in targets if target.expect in (None, "reached")]  # demonstrations are counted apart
     solved = sum(target.chosen_deg is not None for target in asked)
     return (
         Figure("targets_solved", solved, "", of=len(asked)),
-        *(_of_random_poses(trips) if trips else ()),
         Figure("worst_position_residual", position * 1000, "mm"),
         Figure("worst_orientation_residual", float(np.degrees(orientation)), "deg"),
     )
-
-
-def _of_random_poses(trips: BatchRoundTrips) -> tuple[Figure, ...]:
-    counts = trips.counts_within_limits
-    mean = float(counts @ np.arange(len(counts)) / trips.poses)
-    deviation = float(np.sqrt(counts @ (np.arange(len(counts)) - mean) ** 2 / max(trips.poses - 1, 1)))
-    return (
-        Figure("solutions_of_random_pose", mean, "", 1.96 * deviation / trips.poses**0.5, of=len(counts) - 1),
-        Figure("random_poses_solved_back", 100.0 * trips.own_found / trips.poses, "%"),
-    )
-
-
-def _worst_residuals(solutions: model.SolutionRows, trips: BatchRoundTrips | None) -> tuple[float, float]:
-    """Over all targets' solutions and all round trips, m and rad."""
-    position = solutions.position_residual_mm / 1000
-    orientation = np.radians(solutions.orientation_residual_deg)
-    return (
-        float(position.max(initial=trips.worst_position if trips else 0.0)),
-        float(orientation.max(initial=trips.worst_orientation if trips else 0.0)),
-    )
-
-
-def _round_trips(trips: BatchRoundTrips) -> model.RoundTrips:
-    own = trips.worst_own if np.isfinite(trips.worst_own) else None
-    return stated(model.RoundTrips, trips, same_joints=SAME_JOINTS_RAD, worst_own=own)

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-from pydantic import Field
 
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
@@ -15,12 +12,8 @@ from er3a.pipeline.stages.stage import Stage, StudyFiles
 
 
 class InverseSettings(StrictModel):
-    """``round_trips``: random poses solved back.
+    """``scene`` holds the obstacles that clearance is measured from and that solutions may not touch."""
 
-    ``scene`` holds the obstacles that clearance is measured from and that solutions may not touch.
-    """
-
-    round_trips: Annotated[int, Field(ge=1, le=10_000_000)] = 2000
     scene: Text | None = None
 
 

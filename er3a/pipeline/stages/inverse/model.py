@@ -71,26 +71,6 @@ class TargetResult:
     clearance: TargetClearance | None = None
 
 
-@frozen
-class RoundTrips:
-    """Random joints to poses and back (``kinematics.round_trips.BatchRoundTrips``).
-
-    Attributes
-    ----------
-    same_joints_deg : up to this difference joints count as found
-    worst_own_deg : None where a pose has no solution at all
-    """
-
-    poses: int
-    solutions: int
-    own_found: int
-    same_joints_deg: float
-    worst_own_deg: float | None
-    worst_position_mm: float
-    worst_orientation_deg: float
-    counts_within_limits: tuple[int, ...]
-
-
 class InverseSummary(Summary):
     """What the stage found.
 
@@ -99,7 +79,6 @@ class InverseSummary(Summary):
     scene : title of the scene whose solids are not to be touched
     turns : whether the solutions stand in all turns; else (many targets) in the one nearest to the reference
     targets : of many only those that a page shows; all stand in the table of targets
-    round_trips : None for arms without a closed form
     """
 
     needs = ("reach", "limits", "self_collision", "scene_collision")
@@ -107,7 +86,6 @@ class InverseSummary(Summary):
     scene: str | None
     turns: bool
     targets: tuple[TargetResult, ...]
-    round_trips: RoundTrips | None
 
 
 class SolutionRows(Table):

@@ -26,6 +26,7 @@ from er3a.identifiability.statements import (
     title_of,
 )
 from er3a.kinematics import round_trips
+from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
@@ -289,7 +290,7 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
     note = fact("near_singular_left_out", judged=regular, poses=poses, wrist_deg=wrist, shoulder_mm=shoulder)
     checks.insert(1, against_itself("joint_error", GROUP, joints, JOINT_TOLERANCE_DEG, "deg", note))
     margins = model.Margins(wrist, elbow, shoulder)
-    errors = (poses, found.near_singular, joints, millimetres, degrees, found.unsolved)
+    errors = (poses, found.near_singular, joints, millimetres, degrees, found.unsolved, found.within_limits / poses)
     return checks, model.RoundTripErrors(*errors, margins)
 
 
@@ -555,6 +556,7 @@ def key_figures(
     figures += [_figure(name, value) for name, value in reach.items()]
     if trips:
         figures.append(Figure("round_trip_joint_error", trips.joint_error_deg, "deg"))
+        figures.append(Figure("solutions_of_random_pose", trips.solutions, "", of=SLOTS))
     return tuple(figures)
 
 

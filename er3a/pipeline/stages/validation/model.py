@@ -218,7 +218,7 @@ class RoundTripErrors:
     poses : how many; near_singular : how many of them nearer to a singularity than the margins
     joint_error_deg : worst angle between the joints and the nearest solution, over the other poses
     position_error_mm, orientation_error_deg : worst over all solutions of all poses
-    unsolved : poses without any solution
+    unsolved : poses without any solution; solutions : mean number of those within the limits
     """
 
     poses: int
@@ -227,6 +227,7 @@ class RoundTripErrors:
     position_error_mm: float
     orientation_error_deg: float
     unsolved: int
+    solutions: float
     margins: Margins
 
 
