@@ -116,20 +116,6 @@ class ArmModel:
         found: Reals = self.to_rows.T @ M @ self.to_rows
         return found
 
-    def potential_energy(self, q: Reals) -> Reals:
-        """Potential energy of the moving links and the load in gravity.
-
-        Parameters
-        ----------
-        q : (N, n), rad or m
-
-        Returns
-        -------
-        energy : (N,), J, 0 at the height of the world's origin; the base's mass counts nothing
-        """
-        pin, data = pinocchio(), self.model.createData()
-        return np.array([pin.computePotentialEnergy(self.model, data, x) for x in self._x(q)])
-
     def regressor(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
         """The regressor of the torques, which are linear in the masses: ``tau = Y p`` [2]_.
 

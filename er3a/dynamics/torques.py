@@ -218,9 +218,6 @@ def _flat(robot: Robot, named: dict[str, Reals]) -> tuple[list[Reals], tuple[int
     return [np.ascontiguousarray(each).reshape(-1, robot.joints) for each in together], shape
 
 
-POWER_STEP = 2e-5  # s
-
-
 @by_identity
 class Demand:
     """Of each joint (n,), over a motion; N m, W, J, rad/s (N, m/s for prismatic joints).
@@ -292,37 +289,6 @@ def time_mean(t: Reals, values: Reals) -> Reals:
         return mean
     still: Reals = values.mean(axis=0)
     return still
-
-
-def power_imbalance(model: ArmModel, parts: TorqueParts, q: Reals, qd: Reals, qdd: Reals) -> float:
-    """Check of the dynamics: the power into the masses against the change of their energy.
-
-    Parameters
-    ----------
-    parts : torques (N, n) of the motion, whose power is what the difference is compared with
-    q, qd, qdd : (N, n), rad or m, and per s and s^2
-
-    Returns
-    -------
-    imbalance : largest difference, in parts of the largest power; rounding and the difference quotient leave little
-
-    Notes
-    -----
-    The energy is ``qd.T M qd / 2 + V`` by CRBA and the masses' heights, its change a difference along the motion's
-    own Taylor series over 40 us; the power is by RNEA.
-    """
-    h = POWER_STEP
-
-    def energy(step: float) -> Reals:
-        at, velocity = q + step * qd + step**2 / 2 * qdd, qd + step * qdd
-        kinetic = 0.5 * np.einsum("Ni,Nij,Nj->N", velocity, model.mass_matrix(at), velocity)
-        whole: Reals = kinetic + model.potential_energy(at)
-        return whole
-
-    change = (energy(h) - energy(-h)) / (2 * h)
-    power = (model.rigid_torques(q, qd, qdd) * qd).sum(axis=1)
-    scale = max(float(np.abs(parts.total * qd).sum(axis=1).max(initial=0.0)), 1e-9)
-    return float(np.abs(change - power).max(initial=0.0) / scale)
 
 
 def worst_holding(model: ArmModel) -> Maxima:

@@ -152,8 +152,6 @@ def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
     assert {each.reason for each in summary.assumed} >= asked
     assert summary.uses == ()
     assert all(path.payload is path.speed_scale is None for path in summary.paths)
-    assert summary.power_imbalance < 1e-6
-    assert [each.value for each in summary.figures if each.unit == "ppb"] == [1e9 * summary.power_imbalance]
     assert [path.name for path in summary.paths if not path.complete] == ["line_out"]
 
 

@@ -27,7 +27,7 @@ KEPT = re.compile(r"(\{[^}]*\}|%\(\w+\)s|<[^>]*>|&\w+;)")
 WIDE = {ord(letter): ord(letter) + 0xFEE0 for letter in "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"}
 WORD = re.compile(r"[A-Za-z]{3,}")
 # Units, and names that are the same in every language.
-SAME_EVERYWHERE = {"deg", "rad", "er3a", "sha", "rrd", "rpm", "ppb", *LANGUAGES}
+SAME_EVERYWHERE = {"deg", "rad", "er3a", "sha", "rrd", "rpm", *LANGUAGES}
 PROGRAM_SUFFIXES = ("csv", "dat", "var", "XPL", *(suffix[1:] for suffix in SUFFIXES))
 NAMES = re.compile(
     r"\b(?:alpha|beta|offset|direction|lower|upper|speed) ?\d(?:, \d)*\b"  # entries of a table

@@ -58,7 +58,6 @@ KEY_FIGURES = words(
         "holding_torque": "Greatest holding torque found",
         "energy": "Greatest energy of a path that the model does not rule out",
         "utilisation": "Highest utilisation of a limit",
-        "power_balance": "Power balance, greatest error",
     }
 )
 BINDING: dict[Binding, str] = words({"peak": "peak", "rms": "RMS", "speed": "speed"})

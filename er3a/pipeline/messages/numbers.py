@@ -12,7 +12,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 SMALLEST = 1e-4  # uncertainty that is written without a power of ten
 NOTHING = 1e-6  # of a length or an angle: rounding, which nobody reads digits of
-DECIMALS = {"deg": 3, "m³": 3, "m²": 3, "%": 1, "deg/s": 1, "mm/s": 1, "ppb": 0}
+DECIMALS = {"deg": 3, "m³": 3, "m²": 3, "%": 1, "deg/s": 1, "mm/s": 1}
 """The decimals that matter in a unit, 2 in any other."""
 NOISE = 1e-6  # of the last decimal of a bound: rounding of the value itself
 MOST_DECIMALS = 6  # of a bound

@@ -19,7 +19,6 @@ from er3a.dynamics.torques import (
     demand,
     holding_torques,
     known,
-    power_imbalance,
     torque_parts,
     worst_holding,
 )
@@ -262,7 +261,7 @@ class PathTorques:
     Attributes
     ----------
     asked : whether the path is to be run, not to show a fault
-    demand, imbalance : None where the arm can't follow it
+    demand : None where the arm can't follow it
     inertia : (n, 2), smallest and largest that each joint moves, without rotor
     """
 
@@ -271,7 +270,6 @@ class PathTorques:
     rows: model.TorqueRows
     demand: Demand | None
     inertia: Reals
-    imbalance: float | None
 
 
 def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, wrist: tuple[int, ...]) -> PathTorques:
@@ -290,7 +288,7 @@ def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, wrist: tuple[
     if not np.isfinite([q, qd, qdd]).all():
         nothing = (float(t[-1]), (), (), None, None)
         absent = model.PathLoad(entry.name, entry.title, found.outcomes, False, False, *nothing)
-        return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
+        return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan))
     evenly, checked = t, np.union1d(t, motion.t)
     t = np.union1d(checked, within_short_pieces(motion, float(np.diff(checked).max(initial=0.0))))
     rates = np.stack(motion.rates(t), axis=1)
@@ -299,8 +297,7 @@ def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, wrist: tuple[
     parts = torque_parts(arm.model, q, qd, qdd)
     tau, tolerance = parts.total, arm.tolerance(q, qd, qdd)
     needed = demand(t, qd, tau)
-    few = np.isin(t, checked)
-    own = np.diagonal(arm.model.mass_matrix(q[few]), axis1=1, axis2=2)
+    own = np.diagonal(arm.model.mass_matrix(q[np.isin(t, checked)]), axis1=1, axis2=2)
     payload, scale = _margins(arm, parts, t, q, qd, qdd)
     summary = model.PathLoad(
         name=entry.name,
@@ -324,9 +321,7 @@ def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, wrist: tuple[
         power_w=tau * qd,
     ).take(np.isin(t, evenly))
     inertia = np.stack([own.min(axis=0), own.max(axis=0)], axis=1)
-    seen = TorqueParts(**{name: getattr(parts, name)[few] for name in model.PARTS})
-    imbalance = power_imbalance(arm.model, seen, q[few], qd[few], qdd[few])
-    return PathTorques(summary, asked, rows, needed, inertia, imbalance)
+    return PathTorques(summary, asked, rows, needed, inertia)
 
 
 PER_PIECE = 4  # times computed within a piece of a motion
@@ -492,12 +487,11 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     findings = mass_findings(robot) if moving else ()
     unknown = unknowns(robot, open_of_load(study, name))
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
-    imbalances = [path.imbalance for path in paths if path.imbalance is not None]
     summary = model.DynamicsSummary(
         verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped).with_assumed_shapes(
             shapes_assumed(robot, margin, {}) if paths else None
         ),
-        figures=_figures(summaries, holding, uses, imbalances, masses),
+        figures=_figures(summaries, holding, uses, masses),
         gravity_m_s2=settings.gravity_m_s2,
         masses=masses,
         findings=findings,
@@ -507,7 +501,6 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         holding=holding,
         motors=motors,
         uses=uses,
-        power_imbalance=max(imbalances, default=None),
         checked=_checked(paths, rest, settings) if moving else (),
         assumed=(
             *(each for each in rest if each.reason not in GAPS),
@@ -672,7 +665,7 @@ def _masses_used(
     )
 
 
-def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]:
+def _figures(summaries, holding, uses, masses) -> tuple[Figure, ...]:
     loads = [load for path in summaries for load in path.joints if path.counts]
     turning = [load for load in loads if load.unit == model.TORQUE]
     peak = max(turning, key=lambda load: load.peak, default=None)
@@ -686,6 +679,5 @@ def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]
         Figure("holding_torque", abs(held.torque), held.unit, held.tolerance) if held else NO_FIGURE,
         Figure("energy", max(energy, default=None), "J"),
         Figure("utilisation", 100 * uses[0].ratio if uses else None, "%"),
-        Figure("power_balance", max(imbalances) * 1e9 if imbalances else None, "ppb"),
     )
     return tuple(figure for figure in figures if figure.value is not None and figure.of != 0)

@@ -266,7 +266,6 @@ class DynamicsSummary(Summary):
     masses : None where there are none
     payload_centre_mm, payload_gyration_mm : of the payload whose largest mass is asked for
     uses : all that was compared with a limit, the tightest first
-    power_imbalance : largest difference of power and change of energy, of the largest power; None without paths
     """
 
     needs = ("torque", "limits", *OF_MOTIONS)
@@ -280,7 +279,6 @@ class DynamicsSummary(Summary):
     holding: tuple[HoldingTorque, ...]
     motors: tuple[MotorNeed, ...]
     uses: tuple[Use, ...]
-    power_imbalance: float | None
 
 
 class TorqueRows(Table):

@@ -35,7 +35,6 @@ from er3a.robots.robot import Robot
 
 OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
 MAX_POINTS = 20_000  # of a program's motion that are kept
-TURNED = 1e-3  # of a rotation's entries, up to which the tool does not turn
 
 
 def compute(study: Study, name: str) -> model.ProgramsResults:
@@ -151,10 +150,9 @@ def _ended(check: ProgramCheck, found: LocatedFinding, task: MotionTask, options
     last = safe_stop(task, curve, times, along.contacts, others, margin_of(task, options.assumed_margin))
     if last is None:
         return found
-    pose, aim = inverted(motion.base) @ forward(motion.arm, curve.joints(np.array([last.kept_to, times[-1]])))
-    end, turns = tuple((1000 * pose[:3, 3]).tolist()), not np.allclose(pose[:3, :3], aim[:3, :3], atol=TURNED)
-    more = {"end_s": last.kept_to, "margin_mm": 1000 * last.margin, "turns": turns}
-    return replace(found, finding=found.finding.but(end_mm=end, **more))
+    pose = inverted(motion.base) @ forward(motion.arm, curve.joints(np.array([last.kept_to])))[0]
+    end = tuple((1000 * pose[:3, 3]).tolist())
+    return replace(found, finding=found.finding.but(end_mm=end, end_s=last.kept_to, margin_mm=1000 * last.margin))
 
 
 def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, float]) -> model.ProgramSummary:

@@ -40,7 +40,6 @@ from er3a.robots.robot import Robot
 SHORTEST_S = 0.005  # of a cycle: what is shorter was not followed
 MAX_LINES = 400  # of a listing that the page shows
 AROUND = 3  # lines around those with motions or findings, in a longer listing
-PLACE = re.compile(r"(\s*LIN *{ *X *)[-+.\d]+( *, *Y *)[-+.\d]+( *, *Z *)[-+.\d]+")  # of a line of KRL to a pose
 
 
 def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) -> None:
@@ -142,15 +141,6 @@ def _remark(name: str, each: model.FindingAt) -> Markup:
     return Markup("<b>{}</b>{}{}").format(at, tr(": "), text)
 
 
-def _ended(line: str, here: list[model.FindingAt]) -> str:
-    """A line with the place at which it may end; empty where nothing says so, where the line does not give its place in
-    numbers, and where the tool would arrive turned otherwise."""
-    for found in (each.finding for each in here if "end_mm" in each.finding.params):
-        if PLACE.match(line) and not found.turns:
-            return PLACE.sub("".join(f"\\g<{k}>{value:.1f}" for k, value in enumerate(found.end_mm, 1)), line)
-    return ""
-
-
 def _listing(
     program: model.ProgramSummary,
     text: model.Lines,
@@ -196,7 +186,6 @@ def _listing(
                 brief=here and re.split("[;；]", say(min(here, key=weight).finding))[0],
                 remarks=[_remark(name, each) for each in sorted(here, key=cause_first)],
                 remedies=remedies(here),
-                instead=_ended(words, here),
                 facts=_facts(rows, moves[number]),
                 stretch=leads[0],
                 moment=leads[1],
