@@ -38,7 +38,7 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import adapter, table_types
 
-FORMAT_VERSION = 15
+FORMAT_VERSION = 16
 """Of results as they are stored. Rises, at the latest before a release, if a field or column of an earlier release
 goes, or gets another name, unit or meaning. What is only added does not raise it: changed code computes results again.
 """

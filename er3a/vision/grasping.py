@@ -103,7 +103,7 @@ class ChosenGrasp:
     Attributes
     ----------
     grasp : its name; turn : rad, about the object's z
-    T_base_tool : (4, 4); q_before, q, q_after : (n,), rad, at the beginning of the approach, the grasp, and away
+    T_base_tool : (4, 4); q_before, q : (n,), rad, at the beginning of the approach, and the grasp
     legs : the motion, in order
     clearance : m, proven along all of it; None where it can't be measured
     limit_margin : rad, as that of the needs; singular_value : least along both lines
@@ -116,7 +116,6 @@ class ChosenGrasp:
     T_base_tool: Reals
     q_before: Reals
     q: Reals
-    q_after: Reals
     legs: tuple[GraspLeg, ...]
     clearance: float | None
     nearest: Pair | None
@@ -309,7 +308,6 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
         T_base_tool=T,
         q_before=q_before,
         q=candidate.q,
-        q_after=lines[-1].q_end,
         legs=(*moves, *lines),
         clearance=smallest[0] if smallest else None,
         nearest=smallest[1] if smallest else None,

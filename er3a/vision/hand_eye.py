@@ -73,12 +73,10 @@ class AngleCheck(ByValue):
 
     Attributes
     ----------
-    mismatch : (N, N), rad, by how much hand and board differ in how far they turn
     tolerance : rad, beyond which a pair is in conflict
     used : (N,), samples whose pairs all agree
     """
 
-    mismatch: Reals
     tolerance: float
     used: Flags
     found: tuple[Finding, ...]
@@ -108,8 +106,8 @@ def check_angles(samples: CalibrationSet) -> AngleCheck:
 
     Returns
     -------
-    check : mismatch of all pairs in rad, the samples that agree, and a finding for each other one; if no more than half
-        agree, all are used and a warning says so
+    check : the samples that agree, and a finding for each other one; if no more than half agree, all are used and a
+        warning says so
     """
     hand, eye = samples.flange[:, :3, :3], samples.target[:, :3, :3]
     turned = angles_between(hand)
@@ -125,7 +123,7 @@ def check_angles(samples: CalibrationSet) -> AngleCheck:
             of=len(conflict),
             median_deg=float(np.degrees(np.median(mismatch[upper]))),
         )
-        return AngleCheck(mismatch, tolerance, np.ones(len(samples), bool), (), warning)
+        return AngleCheck(tolerance, np.ones(len(samples), bool), (), warning)
     found = tuple(
         fact(
             "rotation_mismatch",
@@ -135,7 +133,7 @@ def check_angles(samples: CalibrationSet) -> AngleCheck:
         )
         for i in np.flatnonzero(~used)
     )
-    return AngleCheck(mismatch, tolerance, used, found, None)
+    return AngleCheck(tolerance, used, found, None)
 
 
 def _tolerance(samples: CalibrationSet, mismatch: Reals) -> float:
@@ -398,7 +396,6 @@ class HandEye(ByValue, Displayed):
     suspects: tuple[Finding, ...]
     warnings: tuple[Finding, ...]
     touch: TouchCheck | None
-    mismatch: Reals
 
     def sheet(self) -> Sheet:
         """What the notebook shows: the twelve numbers in mm and deg, with half their 95 % intervals.
@@ -482,7 +479,6 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
         suspects=tuple(suspects),
         warnings=tuple(warnings),
         touch=None,
-        mismatch=angles.mismatch,
     )
     return found if samples.touched is None else replace(found, touch=_touch(found, samples.touched))
 

@@ -101,7 +101,7 @@ def test_the_page_of_paths_says_once_that_shapes_are_assumed(small_results, tmp_
 
 
 def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():
-    robot, least = load_robot("er3a_c60"), MinClearance(11.2, 0.4, fact("link_pair", first=1, second=3), 5)
+    robot, least = load_robot("er3a_c60"), MinClearance(11.2, 0.4, fact("link_pair", first=1, second=3))
     (near,) = near_assumed_shapes(robot, "a", least, 0.02)
     assert head_line(near).startswith("NOT SETTLED: the path a is clear by 11.2 mm of assumed shapes only")
     assert near_assumed_shapes(robot, "a", least, 0.01) == near_assumed_shapes(documented(), "a", least, 0.02) == ()

@@ -262,7 +262,7 @@ class PathTorques:
     ----------
     asked : whether the path is to be run, not to show a fault
     demand : None where the arm can't follow it
-    inertia : (n, 2), smallest and largest that each joint moves, without rotor
+    inertia : (n,), largest that each joint moves, without rotor
     """
 
     summary: model.PathLoad
@@ -288,7 +288,7 @@ def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, wrist: tuple[
     if not np.isfinite([q, qd, qdd]).all():
         nothing = (float(t[-1]), (), (), None, None)
         absent = model.PathLoad(entry.name, entry.title, found.outcomes, False, False, *nothing)
-        return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan))
+        return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full(n, np.nan))
     evenly, checked = t, np.union1d(t, motion.t)
     t = np.union1d(checked, within_short_pieces(motion, float(np.diff(checked).max(initial=0.0))))
     rates = np.stack(motion.rates(t), axis=1)
@@ -320,8 +320,7 @@ def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, wrist: tuple[
         **{name: getattr(parts, name) for name in model.PARTS},
         power_w=tau * qd,
     ).take(np.isin(t, evenly))
-    inertia = np.stack([own.min(axis=0), own.max(axis=0)], axis=1)
-    return PathTorques(summary, asked, rows, needed, inertia)
+    return PathTorques(summary, asked, rows, needed, own.max(axis=0))
 
 
 PER_PIECE = 4  # times computed within a piece of a motion
@@ -606,8 +605,7 @@ def _motors(
     paths = [path for path in paths if path.summary.counts]
     asked = [path.demand for path in paths if path.demand]
     drives = drives_of(robot)
-    low = np.nanmin([path.inertia[:, 0] for path in paths], axis=0)
-    high = np.nanmax([path.inertia[:, 1] for path in paths], axis=0)
+    high = np.nanmax([path.inertia for path in paths], axis=0)
     speed = np.max([each.speed for each in asked], axis=0)
     found = []
     for j, slides in enumerate(robot.slides):
@@ -622,7 +620,6 @@ def _motors(
                 holding=abs(holding[j].torque),
                 speed=float(1000 * speed[j] if slides else np.degrees(speed[j])),
                 power_w=max(float(each.power[j]) for each in asked),
-                inertia_low=float(low[j]),
                 inertia_high=float(high[j]),
                 inertia_ratio=_known(high[j] / drives.armature[j]) if drives.armature[j] > 0 else None,
                 motor_rpm=_known(speed[j] * ratio * 30 / np.pi) if not slides else None,
@@ -657,7 +654,6 @@ def _masses_used(
         source=source.source if source else "",
         density_kg_m3=settings.capsule_density_kg_m3 if robot is not given else None,
         links=tuple(links),
-        weight_kg=_known(robot.masses.weight),
         load_kg=load.mass if load else None,
         load_centre_mm=tuple(1000 * value for value in load.centre) if load else (),
         load_grade=grades[1],

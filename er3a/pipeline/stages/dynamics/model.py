@@ -93,7 +93,6 @@ class MassesUsed:
     source: str
     density_kg_m3: float | None
     links: tuple[LinkEntry, ...]
-    weight_kg: float | None
     load_kg: float | None
     load_centre_mm: tuple[float, ...]
     load_grade: Grade | None
@@ -235,7 +234,7 @@ class MotorNeed:
     Attributes
     ----------
     speed : deg/s, mm/s if the joint is prismatic
-    inertia_low, inertia_high : of the load that the joint moves along the paths, kg m^2 (kg); without rotor
+    inertia_high : largest, of the load that the joint moves along the paths, kg m^2 (kg); without rotor
     inertia_ratio : of the largest to the rotor's at the joint
     motor_rpm, motor_torque : at the motor, where the gear ratio is known
     """
@@ -247,7 +246,6 @@ class MotorNeed:
     holding: float
     speed: float
     power_w: float
-    inertia_low: float
     inertia_high: float
     inertia_ratio: float | None
     motor_rpm: float | None

@@ -289,12 +289,10 @@ def _motion(cost: StrategyCost, clearance: model.MinClearance | None) -> model.S
     return stated(
         model.StrategyMotion,
         cost,
-        done_ratio=cost.done,
         max_deviation_mm=from_si("mm", cost.distance.max()),
         max_deviation_deg=from_si("deg", cost.angle.max()),
         duration=cost.motion.duration,
         max_joint_speed=cost.motion.max_rates[0],
-        max_joint_acceleration=cost.motion.max_rates[1],
         clearance=clearance,
     )
 

@@ -185,7 +185,7 @@ def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     at = along.closest
     if at < 0 or (pair := along.pair[at]) is None:
         return None
-    return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair, along.measured)
+    return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair)
 
 
 @frozen

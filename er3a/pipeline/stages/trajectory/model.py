@@ -112,7 +112,6 @@ class MinClearance:
     least_mm: float
     t_s: float
     between: Pair
-    poses_measured: int
 
 
 @frozen
@@ -159,19 +158,16 @@ class StrategyMotion:
 
     Attributes
     ----------
-    done_ratio : how much of the path is done, 0..1
     keeps_clear : whether the arm keeps its distance from singular poses wherever the tool is on or beside the path
     clearance : None where none was measured
     """
 
-    done_ratio: float
     max_deviation_mm: float
     max_deviation_deg: float
     duration_s: float
     keeps_clear: bool
     max_joint_speed_deg_s: tuple[float, ...]
     max_joint_speed_ratio: float
-    max_joint_acceleration_deg_s2: tuple[float, ...]
     max_joint_acceleration_ratio: float
     clearance: MinClearance | None
 

@@ -290,7 +290,7 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
     note = fact("near_singular_left_out", judged=regular, poses=poses, wrist_deg=wrist, shoulder_mm=shoulder)
     checks.insert(1, against_itself("joint_error", GROUP, joints, JOINT_TOLERANCE_DEG, "deg", note))
     margins = model.Margins(wrist, elbow, shoulder)
-    errors = (poses, found.near_singular, joints, millimetres, degrees, found.unsolved, found.within_limits / poses)
+    errors = (poses, found.near_singular, joints, found.unsolved, found.within_limits / poses)
     return checks, model.RoundTripErrors(*errors, margins)
 
 

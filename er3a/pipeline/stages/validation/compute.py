@@ -52,7 +52,6 @@ def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis)
         against=tuple(title_of(name, references.documents) for name in documents),
         from_table=tuple(title_of(name, references.documents) for name in own),
         references=diagnosis.references,
-        hypotheses_tried=diagnosis.tried,
         hypotheses=tuple(stated(model.RankedHypothesis, each) for each in diagnosis),
         corrected=stated(model.CorrectedTable, diagnosis[0].corrected) if diagnosis.names_fault else None,
     )

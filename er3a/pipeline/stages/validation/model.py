@@ -143,7 +143,7 @@ class SetDiagnosis:
 
     Attributes
     ----------
-    references : how many it rests on; hypotheses_tried : how many were evaluated
+    references : how many it rests on
     against : titles of the documents that residuals are measured against; from_table : of those among them that the
         table was taken from, or that were made from it, which are no evidence for its numbers
     hypotheses : best first
@@ -155,7 +155,6 @@ class SetDiagnosis:
     against: tuple[str, ...]
     from_table: tuple[str, ...]
     references: int
-    hypotheses_tried: int
     hypotheses: tuple[RankedHypothesis, ...]
     corrected: CorrectedTable | None
 
@@ -217,15 +216,12 @@ class RoundTripErrors:
     ----------
     poses : how many; near_singular : how many of them nearer to a singularity than the margins
     joint_error_deg : worst angle between the joints and the nearest solution, over the other poses
-    position_error_mm, orientation_error_deg : worst over all solutions of all poses
     unsolved : poses without any solution; solutions : mean number of those within the limits
     """
 
     poses: int
     near_singular: int
     joint_error_deg: float
-    position_error_mm: float
-    orientation_error_deg: float
     unsolved: int
     solutions: float
     margins: Margins

@@ -93,7 +93,6 @@ def calibration_result(
         boardless=boardless,
         copies=found.copies,
         intrinsics_estimated=images is not None and images.views.shared is not None,
-        intrinsics_given=images is not None and images.views.shared is None,
     )
 
 
@@ -120,21 +119,18 @@ def sample_rows(found: HandEye, robot: Robot) -> model.SampleRows:
 
     Returns
     -------
-    rows : residuals in mm and deg. Points in mm, in the base frame: the flange, the board as it was seen, and as it was
-        predicted. Joints are NaN where none were recorded.
+    rows : residuals in mm and deg. Points in mm, in the base frame: the board as it was seen, and as it was predicted.
+        Joints are NaN where none were recorded.
     """
     samples, count = found.samples, len(found.samples)
     in_hand = samples.setup == "eye_in_hand"
     seen = (samples.flange if in_hand else np.eye(4)) @ found.X @ samples.target
     predicted = np.broadcast_to(found.Y, seen.shape) if in_hand else samples.flange @ found.Y
-    others = np.where(np.eye(count, dtype=bool) | ~found.used, np.nan, found.mismatch)
     return model.SampleRows.of(
         sample=samples.names,
         used=found.used,
         residual_mm=1000 * found.residual[:, :3],
         residual_deg=np.degrees(found.residual[:, 3:]),
-        mismatch_deg=np.degrees(np.nanmedian(others, axis=1)),
-        flange_mm=1000 * samples.flange[:, :3, 3],
         seen_mm=1000 * seen[:, :3, 3],
         predicted_mm=1000 * predicted[:, :3, 3],
         q_deg=np.full((count, robot.joints), np.nan) if samples.q is None else shown(robot, samples.q),
@@ -450,15 +446,12 @@ def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan, moved: 
 
 
 def _grasp(robot: Robot, chosen: ChosenGrasp) -> model.GraspResult:
-    pose = _pose(chosen.T_base_tool)
     return stated(
         model.GraspResult,
         chosen,
-        tool_xyz=pose["xyz"],
-        tool_rpy=pose["rpy"],
+        tool_xyz=chosen.T_base_tool[:3, 3],
         q_before_deg=tuple(shown(robot, chosen.q_before).tolist()),
         q_deg=tuple(shown(robot, chosen.q).tolist()),
-        q_after_deg=tuple(shown(robot, chosen.q_after).tolist()),
         corners=sum(leg.part == "move" for leg in chosen.legs) - 1,
         duration_s=sum(leg.duration for leg in chosen.legs),
     )

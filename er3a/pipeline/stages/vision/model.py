@@ -57,7 +57,6 @@ class CalibrationResult:
     copies : samples left out as exact copies of earlier ones
     open_tilts : images that leave open which way the board is tilted; boardless : images left out, without a board
     intrinsics_estimated : from the same images; the intervals include their errors
-    intrinsics_given : with the images, as exact
     """
 
     title: str
@@ -83,7 +82,6 @@ class CalibrationResult:
     boardless: tuple[Finding, ...] = ()
     copies: tuple[str, ...] = ()
     intrinsics_estimated: bool = False
-    intrinsics_given: bool = False
 
     @property
     def rejected(self) -> tuple[str, ...]:
@@ -119,10 +117,8 @@ class GraspResult:
     grasp: str
     turn_deg: float
     tool_xyz_mm: Three
-    tool_rpy_deg: Three
     q_before_deg: tuple[float, ...]
     q_deg: tuple[float, ...]
-    q_after_deg: tuple[float, ...]
     clearance_mm: float | None
     nearest: Pair | None
     limit_margin_deg: float
@@ -192,8 +188,6 @@ class SampleRows(Table):
     residual_deg: Reals = vector(
         "residual_{}_deg", "turn from the board predicted to the one seen, by the camera's axes", parts=ROTATIONS
     )
-    mismatch_deg: Reals = column("median difference of how far hand and board turn to the other samples")
-    flange_mm: Reals = vector("flange_{}_mm", "flange in the base's frame")
     seen_mm: Reals = vector("seen_{}_mm", "board in the base's frame, by the camera")
     predicted_mm: Reals = vector("predicted_{}_mm", "board in the base's frame, by the arm")
     q_deg: Reals = per_joint("joint angle; NaN where poses were recorded")

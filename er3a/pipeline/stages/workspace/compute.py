@@ -151,7 +151,6 @@ def _summary(
         axis=model.AxisSummary(
             model.triple(grid.axis_point), model.triple(grid.axis), model.triple(shoulder_of(robot, grid))
         ),
-        section_cell_m=grid.section_cell,
         voids=tuple(stated(model.VoidSummary, void, volume_m3=model.Bounds(void.lower, void.upper)) for void in voids),
         pocket_block_m=pocket_block(proven),
         capability=tool.capability,

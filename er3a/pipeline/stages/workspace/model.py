@@ -357,7 +357,6 @@ class WorkspaceSummary(Summary):
     proof: ProofSummary
     reach_m: ReachExtremes
     axis: AxisSummary
-    section_cell_m: float
     voids: tuple[VoidSummary, ...]
     pocket_block_m: float
     capability: CapabilitySummary | Finding
