@@ -74,8 +74,11 @@ def mounted(folder: Path, options: str) -> Iterator[None]:
 
 def in_the_way(folder: Path, stack: ExitStack) -> None:
     """A file where a folder is to be made."""
-    (folder / "elsewhere").write_text("in the way")
-    stack.callback((folder / "elsewhere").unlink)
+    results, kept = folder / "results", folder / "kept"
+    results.rename(kept)
+    stack.callback(kept.rename, results)
+    results.write_text("in the way")
+    stack.callback(results.unlink)
 
 
 def older(folder: Path, _: ExitStack) -> None:
@@ -99,7 +102,7 @@ FAULTS = (
     Fault("disk full: recording", disk(f"reports/{ROBOT}", "size=16k"), VIEWS, f"{VIEW}.rrd", root=True),
     Fault("results can't be written", disk(STAGE, "ro"), COMPUTE, f"{STAGE}/samples.parquet", root=True),
     Fault("reports can't be written", disk(f"reports/{ROBOT}", "ro"), VIEWS, f"{VIEW}.rrd", root=True),
-    Fault("a file where a folder must be", in_the_way, (*COMPUTE, "--results", "elsewhere"), "elsewhere"),
+    Fault("a file where a folder must be", in_the_way, COMPUTE, "results"),
     Fault("memory limit (ulimit -v)", lambda *_: None, ("compute", "workspace", ROBOT, "--study", "large.yaml"),
           f"er3a compute workspace {ROBOT}", memory=MEMORY),
     Fault("table cut in half", halve(f"{STAGE}/checks.parquet"), VIEWS, "checks.parquet: damaged"),

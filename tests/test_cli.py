@@ -31,7 +31,6 @@ def test_check_names_every_bad_file_and_goes_on(call, tmp_path):
         (("compute", "validtion", "er3_600"), "there is no stage 'validtion'"),
         (("compute", "inverse", "er3_600", "--study", "nowhere.yaml"), "nowhere.yaml: there is no such file"),
         (("views", "er3_600", "validtion"), "there is no stage 'validtion'"),
-        (("views", "er3_600", "inverse", "--results", "nowhere"), "nowhere/er3_600/inverse/summary.json: missing"),
         (("view", "nobody"), "no recordings below reports/nobody"),
     ],
 )

@@ -153,11 +153,10 @@ def test_calibration_for_programs(call, tmp_path):
 
 
 def test_a_program_reads_verdicts_and_continuous_integration_an_exit_code(call, small_study):
-    results = small_study.folder / "results"
     study = small_study.folder / "config/small.yaml"
 
     def verdicts(*words: str) -> subprocess.CompletedProcess[str]:
-        return call("verdicts", "--study", study, "--results", results, *words)
+        return call("verdicts", "--study", study, *words, folder=small_study.folder)
 
     found = json.loads(verdicts("--json").stdout)
     assert {each["robot"] for each in found} == set(small_study.robots)

@@ -17,6 +17,7 @@ from er3a.errors import InputError, ResultError
 from er3a.files.kept_files import shown_path
 from er3a.finding import fact
 from er3a.pipeline import verdicts
+from er3a.pipeline.commands import options
 from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.results import Summary, Verdict, write_checksum
 from er3a.pipeline.run_study import run_study
@@ -363,6 +364,7 @@ def test_every_status_in_one_study_is_the_same_in_index_report_and_exit_codes(tm
             "stages": ["validation", "workspace", "programs"],
             "expect": {"programs": expect} if expect else {},
         }
+    monkeypatch.setattr(options, "RESULTS", results)
     study = Study.model_validate(content | {"robots": robots})
     for name in EVERY:
         with monkeypatch.context() as patch:
@@ -391,7 +393,7 @@ def test_every_status_in_one_study_is_the_same_in_index_report_and_exit_codes(tm
         (tmp_path / "study.yaml").write_text(yaml.safe_dump(content | {"robots": {name: robots[name]}}))
         for level, code in zip(("caution", "fail"), codes):
             if name != "not_run":
-                done = call("verdicts", "--study", tmp_path / "study.yaml", "--results", results, "--fail-on", level)
+                done = call("verdicts", "--study", tmp_path / "study.yaml", "--fail-on", level)
                 assert done.returncode == code, (name, level)
                 assert "neither passed nor failed: 2 not examined" in done.stderr
         use, said = decision_of(page, name)
@@ -400,7 +402,7 @@ def test_every_status_in_one_study_is_the_same_in_index_report_and_exit_codes(tm
     whole = tmp_path / "study.yaml"
     whole.write_text(yaml.safe_dump(content | {"robots": robots}))
     for level, count in (("caution", 4), ("fail", 3)):
-        done = call("verdicts", "--study", whole, "--results", results, "--fail-on", level)
+        done = call("verdicts", "--study", whole, "--fail-on", level)
         assert done.returncode == 1
         assert done.stderr.count(", programs (") == count
         assert "17 not examined, 1 no reference, of 24 stages" in done.stderr

@@ -23,6 +23,7 @@ from typer.testing import CliRunner
 
 from er3a.errors import ResultError
 from er3a.pipeline.cli import app
+from er3a.pipeline.commands import options
 from er3a.pipeline.results import FORMAT_VERSION, check_results, checksum_file, write_checksums
 from er3a.pipeline.study import load_study
 from er3a.pipeline.verdicts import read_verdicts
@@ -174,7 +175,7 @@ def _but_for_commit(page: Path) -> str:
     return re.sub(r"<dt>commit</dt><dd>.*?</dd>", "", page.read_text(encoding="utf-8"))
 
 
-def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_study, tmp_path):
+def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_study, tmp_path, monkeypatch):
     run = replace(small_study, folder=shutil.copytree(small_study.folder, tmp_path / "project"))
     results, reports = run.folder / "results", run.folder / "reports"
     before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
@@ -191,7 +192,8 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
     half = reports / "er3_600/validation.rrd"
     half.write_bytes(half.read_bytes()[: half.stat().st_size // 2])
 
-    told = CliRunner().invoke(app, ["view", "er3_600", "--reports", str(reports)])
+    monkeypatch.setattr(options, "REPORTS", reports)
+    told = CliRunner().invoke(app, ["view", "er3_600"])
     assert str(told.exception).startswith(f"{half}: damaged")
     with pytest.raises(ResultError, match=r"er3_600/inverse/solutions\.parquet: damaged"):
         check_results(results / "er3_600/inverse")

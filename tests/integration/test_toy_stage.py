@@ -115,12 +115,12 @@ def with_toy(fresh_project, small_study):
     return project
 
 
-def er3a(project, *commands: tuple[str, ...]) -> str:
+def er3a(project, *commands: tuple[str, ...], folder: str = ".") -> str:
     """Call the copy's command line, in one process."""
     command = [sys.executable, "-c", CALLS, json.dumps(commands)]
     environment = project.environment() | {"ER3A_STUDY": STUDY}
     done = subprocess.run(
-        command, cwd=project.folder, env=environment, capture_output=True, text=True, timeout=300, check=False
+        command, cwd=project.folder / folder, env=environment, capture_output=True, text=True, timeout=300, check=False
     )
     assert done.returncode == 0, done.stderr
     return done.stderr
@@ -146,16 +146,16 @@ def test_a_robot_for_which_it_fails_has_a_reason_and_the_index_stands(with_toy):
     shutil.copytree(folder / "results", folder / "other/results")
     study = (folder / STUDY).read_text(encoding="utf-8").replace("factor: 3", "factor: 0")
     (folder / "other.yaml").write_text(study, encoding="utf-8")
-    where = ("--study", "other.yaml", "--results", "other/results")
-    views = (*where, "--reports", "other")
-    verbs = ("compute", "toy", "er3_600", *where), ("views", "er3_600", "toy", *views), ("index", *views)
-    told = er3a(with_toy, *verbs)
+    (folder / "other/data").symlink_to(folder / "data")
+    where = ("--study", "../other.yaml")
+    verbs = ("compute", "toy", "er3_600", *where), ("views", "er3_600", "toy", *where), ("index", *where)
+    told = er3a(with_toy, *verbs, folder="other")
     assert f"note: er3_600, toy: Not computed: {reason}\n" in told
     failed = json.loads((folder / "other/results/er3_600/toy/summary.json").read_text(encoding="utf-8"))
     assert failed["verdict"]["status"] == "not_computed"
     assert failed["verdict"]["params"] == {"reason": reason}
     for page in ("er3_600/toy.html", "index.html"):
-        assert reason in (folder / "other" / page).read_text(encoding="utf-8")
+        assert reason in (folder / "other/reports" / page).read_text(encoding="utf-8")
 
 
 def test_a_robot_to_which_it_does_not_apply_has_a_reason_of_its_own(with_toy):

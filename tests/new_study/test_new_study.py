@@ -440,7 +440,6 @@ def test_a_urdf_without_shapes_is_said_to_have_guessed_ones(tmp_path):
     ("words", "told"),
     [
         (("--robot", "er3_601"), "there is no robot 'er3_601'"),
-        (("--robot", "er3_600", "--name", "Arm"), "can't be a robot's name"),
         (("--urdf", "nowhere.urdf"), "there is no such file"),
     ],
 )

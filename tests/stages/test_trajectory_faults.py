@@ -17,6 +17,7 @@ from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.finding import fact, is_one
 from er3a.kinematics.forward import forward
+from er3a.pipeline.commands import options
 from er3a.pipeline.messages.planning import times_needed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import (
@@ -114,18 +115,19 @@ def cell_of(index: Path) -> tuple[str, str, str]:
 
 @pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
-def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path, call, case):
+def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path, call, monkeypatch, case):
     """From the path file to exit codes, the report for continuous integration and the index."""
     names, expect, status, codes, shown = CASES[case]
     study = study_of(tmp_path, "line_clean", *names, expect=expect, settings={"avoidance": "slow"})
     results, file = tmp_path / "results", tmp_path / "study.yaml"
+    monkeypatch.setattr(options, "RESULTS", results)
     run.compute("trajectory", study, ROBOT, results / ROBOT / "trajectory")
     (verdict,) = (each for each in read_verdicts(study, results) if each.stage == "trajectory")
     assert verdict.status == status
     assert verdict.demonstrations == shown
     file.write_text(yaml.safe_dump(study.model_dump(mode="json", exclude_none=True)), encoding="utf-8")
     for level, code in zip(("caution", "fail"), codes):
-        assert call("verdicts", "--study", file, "--results", results, "--fail-on", level).returncode == code, level
+        assert call("verdicts", "--study", file, "--fail-on", level).returncode == code, level
     write_index(study, results, tmp_path)
     report = etree.parse(tmp_path / "junit.xml").getroot()
     assert report.get("failures") == str(codes[1])

@@ -16,6 +16,7 @@ import pytest
 
 from er3a.errors import ResultError
 from er3a.pipeline.cli import app
+from er3a.pipeline.commands import options
 from er3a.pipeline.results import check_checksum, write_checksum
 from er3a.pipeline.viewing.viewer import free_port, viewer_running, without_statistics
 
@@ -122,7 +123,8 @@ def test_a_recording_cut_in_half_is_one_line_and_is_not_opened(recording, monkey
     started = []
     monkeypatch.setattr(subprocess, "run", lambda command, **_: started.append(command))
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    done = CliRunner().invoke(app, ["view", "--reports", str(reports)])
+    monkeypatch.setattr(options, "REPORTS", reports)
+    done = CliRunner().invoke(app, ["view"])
     assert isinstance(done.exception, ResultError)
     assert str(done.exception).startswith(f"{path}: damaged (its checksum does not agree). Delete the file")
     assert started == []

@@ -16,6 +16,7 @@ import psutil
 import pytest
 
 from er3a.pipeline.cli import app
+from er3a.pipeline.commands import options
 from er3a.pipeline.results import write_checksum
 from er3a.pipeline.viewing import viewer
 from testing.processes import started
@@ -32,10 +33,10 @@ main()
 @pytest.fixture(scope="module")
 def reports(tmp_path_factory):
     """Reports with two recordings; what is in them does not matter here."""
-    folder = tmp_path_factory.mktemp("reports")
+    folder = tmp_path_factory.mktemp("viewed") / "reports"
     for stage in ("inverse", "workspace"):
         path = folder / f"er3_600/{stage}.rrd"
-        path.parent.mkdir(exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(f"recording of {stage}".encode())
         write_checksum(path)
     return folder
@@ -86,8 +87,8 @@ def test_nothing_else_is_served(root, path):
 @pytest.mark.parametrize("request_to_end", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_without_a_desktop_view_serves_on_the_loopback_address_until_it_is_told_to_end(reports, request_to_end):
     quiet = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    command = [sys.executable, "-c", AS_FROM_A_TERMINAL, "view", "er3_600", "--reports", str(reports)]
-    with started(command, env=quiet, stdout=subprocess.PIPE) as viewing:
+    command = [sys.executable, "-c", AS_FROM_A_TERMINAL, "view", "er3_600"]
+    with started(command, cwd=reports.parent, env=quiet, stdout=subprocess.PIPE) as viewing:
         told = [viewing.stdout.readline() for _ in range(3)]
         assert "Ctrl+C" in told[0]
         with urllib.request.urlopen(told[1].strip(), timeout=60) as answer:
@@ -107,5 +108,6 @@ def test_with_a_desktop_view_opens_a_window(reports, monkeypatch):
     monkeypatch.setenv("DISPLAY", ":0")
     ended = subprocess.CompletedProcess([], 0)
     monkeypatch.setattr(subprocess, "run", lambda command, **_: started.append(command) or ended)
-    assert CliRunner().invoke(app, ["view", "--reports", str(reports)]).exit_code == 0
+    monkeypatch.setattr(options, "REPORTS", reports)
+    assert CliRunner().invoke(app, ["view"]).exit_code == 0
     assert [part for part in started[0] if part.endswith(".rrd")] == sorted(map(str, reports.glob("*/*.rrd")))

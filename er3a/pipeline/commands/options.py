@@ -20,8 +20,7 @@ from er3a.version import __version__
 __all__ = ["app"]
 
 DEFAULT_STUDY = Path("config/config.yaml")
-DEFAULT_RESULTS = Path("results")
-DEFAULT_REPORTS = Path("reports")
+RESULTS, REPORTS = Path("results"), Path("reports")
 
 _START = """\
 er3a: can this kinematic model of a serial robot be trusted, and what can the robot do?
@@ -78,8 +77,6 @@ SomeRobot = Annotated[
 ]
 AnyRobot = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file")]
 StudyFile = Annotated[Path, typer.Option("--study", envvar="ER3A_STUDY", help="the study file")]
-Results = Annotated[Path, typer.Option(help="folder of the results")]
-Reports = Annotated[Path, typer.Option(help="folder of the reports")]
 Base = Annotated[str | None, typer.Option(help="the link of a URDF at which the arm begins (default: the root)")]
 Tip = Annotated[str | None, typer.Option(help="the link of a URDF at which the arm ends, if there are several ends")]
 Columns = Annotated[

@@ -35,7 +35,6 @@ def compute(
     stage: StageNames,
     robot: options.RobotName,
     study: options.StudyFile = options.DEFAULT_STUDY,
-    results: options.Results = options.DEFAULT_RESULTS,
     *,
     changed: Annotated[bool, typer.Option("--changed", help="only stages whose results are not up to date")] = False,
     show: Annotated[str, typer.Option(metavar="STAGE", help="write this one's page, too, as soon as it can be")] = "",
@@ -46,15 +45,15 @@ def compute(
     show = show and _known(show, STAGES)
     for name in [_known(each, STAGES) for each in stage.split(",")]:
         loaded = load_study(study)  # for each: what is noted while files are read belongs to the stage that reads them
-        folder = results / robot / name
+        folder = options.RESULTS / robot / name
         if changed and is_current(folder, loaded, robot, name):
             continue
         if absent := run.compute(name, loaded, robot, folder):
             options.print_note(f"{robot}, {name}: {absent}")
         if name == show:
             with language.using("en"):  # which it is again for the other stages
-                views(robot, [show], study, results)
-            print(f"{options.DEFAULT_REPORTS / robot / show}.html can be read while the rest is computed", flush=True)
+                views(robot, [show], study)
+            print(f"{options.REPORTS / robot / show}.html can be read while the rest is computed", flush=True)
 
 
 @options.app.command()
@@ -64,8 +63,6 @@ def views(
         list[str] | None, typer.Argument(metavar="[PAGE]...", help="stages, and teach (default: all that it has)")
     ] = None,
     study: options.StudyFile = options.DEFAULT_STUDY,
-    results: options.Results = options.DEFAULT_RESULTS,
-    reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Write a robot's recordings (always in English), a picture of each, and pages from results."""
     from er3a.pipeline.stages import run
@@ -77,27 +74,27 @@ def views(
     stages = [STAGES[page] for page in named if page != TEACH]
 
     def show(verb: str, stage: str, kind: str) -> None:
-        view = reports / robot / f"{stage}.{kind}"
-        run.show(verb, stage, loaded, robot, results / robot / stage, view)
+        view = options.REPORTS / robot / f"{stage}.{kind}"
+        run.show(verb, stage, loaded, robot, options.RESULTS / robot / stage, view)
         write_checksum(view)
 
     with language.using("en"):
         for stage in stages:  # first: pages show their pictures where there is no WebGL
             if "record" in stage.views:
                 show("record", stage.name, "rrd")
-                write_checksum(reports / robot / f"{stage.name}.webp")
+                write_checksum(options.REPORTS / robot / f"{stage.name}.webp")
     with house_style():
         for stage in stages:
             show("report", stage.name, "html")
     if TEACH in named:
-        _write_teach_page(loaded, robot, results, reports)
+        _write_teach_page(loaded, robot)
 
 
-def _write_teach_page(study: Study, robot: str, results: Path, reports: Path) -> None:
+def _write_teach_page(study: Study, robot: str) -> None:
     from er3a.pipeline.teach.panel import write_teach_page
 
-    page = reports / robot / "teach.html"
-    write_teach_page(study, robot, results, page)
+    page = options.REPORTS / robot / "teach.html"
+    write_teach_page(study, robot, options.RESULTS, page)
     write_checksum(page)
 
 
@@ -107,8 +104,6 @@ def teach(
         str, typer.Argument(metavar="ROBOT", help="a robot of the study, or a robot file, D-H table or URDF")
     ],
     study: options.StudyFile = options.DEFAULT_STUDY,
-    results: options.Results = options.DEFAULT_RESULTS,
-    reports: options.Reports = options.DEFAULT_REPORTS,
     output: Annotated[
         Path | None, typer.Option(help="the page to write, if ROBOT is a file (default: NAME.html)")
     ] = None,
@@ -138,7 +133,7 @@ def teach(
         raise Er3aError(
             "--output needs a file or a known arm as ROBOT; that of a study's robot is written to the reports folder"
         )
-    _write_teach_page(_study_to_show(study), robot, results, reports)
+    _write_teach_page(_study_to_show(study), robot)
 
 
 def _teach_file(source: str, page: Path, given: dict[str, Any]) -> None:
@@ -163,8 +158,6 @@ def _teach_file(source: str, page: Path, given: dict[str, Any]) -> None:
 @options.app.command()
 def index(
     study: options.StudyFile = options.DEFAULT_STUDY,
-    results: options.Results = options.DEFAULT_RESULTS,
-    reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Write the index."""
     from er3a.pipeline.overview.index import write_index
@@ -173,16 +166,14 @@ def index(
 
     shown = _study_to_show(study)
     with house_style():
-        write_index(shown, results, reports)
+        write_index(shown, options.RESULTS, options.REPORTS)
     for page in OVERALL:
-        write_checksum(reports / page)
+        write_checksum(options.REPORTS / page)
 
 
 @options.app.command()
 def article(
     study: options.StudyFile = options.DEFAULT_STUDY,
-    results: options.Results = options.DEFAULT_RESULTS,
-    reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Write the page on the article from results; `er3a run --study config/article.yaml` also computes them."""
     from er3a.pipeline.article.article_page import write_article
@@ -190,9 +181,9 @@ def article(
     shown = _study_to_show(study)
     if shown.article is None:
         raise Er3aError(f"{study}: article: missing. Name the tables to compare: printed, corrected and real")
-    write_article(shown, shown.article, results, reports)
+    write_article(shown, shown.article, options.RESULTS, options.REPORTS)
     for page in shown.article_pages().values():
-        write_checksum(reports / page)
+        write_checksum(options.REPORTS / page)
 
 
 def _study_to_show(file: Path) -> Study:

@@ -36,7 +36,6 @@ def new(
         str,
         typer.Option("--robot", "--urdf", "--dh", help="the arm: a robot's name or file, a URDF or xacro, a D-H table"),
     ],
-    name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: its file's)")] = None,
     convention: Conventions = None,
     length_unit: Lengths = None,
     angle_unit: Angles = None,
@@ -53,7 +52,7 @@ def new(
     form: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
     form |= {"columns": options.columns_of(column), "base": base, "tip": tip, "xacro": xacro or (), "srdf": srdf}
     with shown_work(f"{folder}: reading the arm") as at:
-        arm = arm_of(source, name, **form)
+        arm = arm_of(source, **form)
         compiles = "" if STAGES["trajectory"].compiled.exists() else "; the first time er3a compiles, up to two minutes"
         at(f"{folder}: searching for targets and paths that the arm can do{compiles}")
         files, shortcoming = write_study(arm, folder)
@@ -149,15 +148,15 @@ def run(
     from er3a.pipeline.run_study import asked_robots, asked_stages, parsed, run_study
     from er3a.pipeline.verdicts import read_verdicts
 
-    if not run_study(study, options.DEFAULT_RESULTS, options.DEFAULT_REPORTS, words or []):
+    if not run_study(study, options.RESULTS, options.REPORTS, words or []):
         raise typer.Exit(2)
     asked = parsed(words or [])
     if fail_on:
-        _end_with_findings(read_verdicts(load_study(study), options.DEFAULT_RESULTS), fail_on)
+        _end_with_findings(read_verdicts(load_study(study), options.RESULTS), fail_on)
     elif not asked.dryrun:  # what was made, and changed in the meantime
         stages, robots = asked_stages(asked.targets), asked_robots(asked.targets)
         with suppress(ResultError):  # such as after an option that only lists something
-            found = read_verdicts(load_study(study), options.DEFAULT_RESULTS)
+            found = read_verdicts(load_study(study), options.RESULTS)
             old = [each for each in found if each.outdated and each.stage in (stages or STAGES)]
             _end_with_findings([each for each in old if each.robot in (robots or [each.robot])], options.FailOn.fail)
 
@@ -165,7 +164,6 @@ def run(
 @options.app.command()
 def verdicts(
     study: options.StudyFile = options.DEFAULT_STUDY,
-    results: options.Results = options.DEFAULT_RESULTS,
     fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for this verdict or a worse one")] = None,
     every: Annotated[bool, typer.Option("--all", help="print all that was found, checked and not checked")] = False,
     as_json: options.AsJson = False,
@@ -174,7 +172,7 @@ def verdicts(
     from er3a.pipeline.verdicts import read_verdicts
     from er3a.pipeline.viewing.conditions import condition_of
 
-    found = read_verdicts(load_study(study), results)
+    found = read_verdicts(load_study(study), options.RESULTS)
     if as_json:
         options.print_json([asdict(verdict) for verdict in found])
     else:
@@ -184,7 +182,7 @@ def verdicts(
         options.print_table(("robot", "stage", "verdict", "finding"), rows)
         for each in found:
             open_table = each.stage == "validation" and each.status in ("caution", "no_reference")
-            if first := open_table and condition_of(results / each.robot / each.stage)[0]:
+            if first := open_table and condition_of(options.RESULTS / each.robot / each.stage)[0]:
                 print(f"{each.robot}: {first}")
         if changed := [*dict.fromkeys(name for each in found for name in each.outdated)]:
             options.print_note(f"changed since ({', '.join(changed)}): run the study again")
@@ -210,15 +208,14 @@ def _end_with_findings(found: Sequence[StageVerdict], level: options.FailOn) -> 
 @options.app.command()
 def view(
     robot: options.SomeRobot = None,
-    reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Open the recordings in the Rerun viewer, or, without a desktop, serve them to a browser."""
     from er3a.pipeline.results import check_checksum
     from er3a.pipeline.viewing.viewer import has_display, serve, viewer_command, without_statistics
 
-    recordings = sorted(reports.glob(f"{robot or '*'}/*.rrd"))
+    recordings = sorted(options.REPORTS.glob(f"{robot or '*'}/*.rrd"))
     if not recordings:
-        raise Er3aError(f"no recordings below {reports / (robot or '')}; run the study first")
+        raise Er3aError(f"no recordings below {options.REPORTS / (robot or '')}; run the study first")
     for recording in recordings:
         check_checksum(recording)
     if not has_display():
