@@ -14,13 +14,9 @@ from er3a.pipeline.messages.say import FORMATS, WORDS, same_text, say_as, says, 
 KEY_FIGURES = words(
     {
         "free_of_collisions": "Collision-free joint space",
-        "free_of_itself": "Free of self-collision",
-        "free_of_scene": "Free of collisions with the scene",
         "clear_places": "Cells reached without collision",
         "joined_places": "Of these, connected to home",
         "lost_volume": "Volume lost to collisions, estimate",
-        "watched_pairs": "Pairs of links that can collide, and are checked",
-        "undecided_pairs": "Pairs undecided",
     }
 )
 HOMES = words({"study": "as given", "zero": "joints at 0", "chosen": "chosen away from singular poses"})

@@ -115,8 +115,6 @@ KEY_FIGURES = words(
     {
         "programs_passed": "Programs that pass, of those meant to",
         "instructions_passed": "Motion instructions that pass, of programs meant to pass",
-        "instructions_caution": "Motion instructions with caution, of programs meant to pass",
-        "instructions_failed": "Motion instructions that fail, of programs meant to pass",
         "least_clearance": "Least clearance of programs meant to pass",
     }
 )

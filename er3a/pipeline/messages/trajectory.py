@@ -21,12 +21,10 @@ KEY_FIGURES = words(
     {
         "safe": "Paths that pass in the model, of those meant to",
         "singular_poses": "Singular poses met, on paths meant to be safe (joint moves pass them unharmed)",
-        "near_passes": "Near-singular passes, on paths meant to be safe",
         "colliding": "Paths with a collision, of those meant to be safe",
         "max_joint_speed": "Joint speed nearest its limit, on paths meant to be safe",
         "assumed_speed_ratio": "Ratio to that joint's assumed limit",
         "speed_ratio": "Ratio to that joint's limit",
-        "characteristic_length": "Characteristic length of the Jacobian",
     }
 )
 KINDS: dict[model.PathKind, str] = words(

@@ -19,7 +19,6 @@ KEY_FIGURES = words(
         "volume_lower": "reached volume, at least",
         "volume_upper": "reached volume, at most",
         "least_reach": "least distance from axis 1",
-        "samples": "samples",
     }
 )
 

@@ -189,7 +189,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     return model.CollisionResults(
         summary=model.CollisionSummary(
             verdict=_verdict(pairs, mounting, wrong or None, free, home).with_assumed_shapes(assumed),
-            figures=_figures(space, places_found, matrix),
+            figures=_figures(space, places_found),
             scene=scene.title if scene else None,
             samples=settings.samples,
             of_itself=_share(space.of_itself),
@@ -368,18 +368,11 @@ def _verdict(
     return Verdict("caution" if home or not found.joined or blocked else "pass", home or found)
 
 
-def _figures(space: free_space.JointSpace, places: model.PlacesSummary, matrix: model.MatrixRows) -> tuple[Figure, ...]:
-    def percent(name: str, share: free_space.Share) -> Figure:
-        low, high = share.interval
-        return Figure(name, 100 * share.value, "%", 50 * (high - low))
-
+def _figures(space: free_space.JointSpace, places: model.PlacesSummary) -> tuple[Figure, ...]:
+    low, high = space.whole.interval
     return (
-        percent("free_of_collisions", space.whole),
-        percent("free_of_itself", space.of_itself),
-        percent("free_of_scene", space.of_scene),
+        Figure("free_of_collisions", 100 * space.whole.value, "%", 50 * (high - low)),
         Figure("clear_places", places.clear, "", of=places.reached),
         Figure("joined_places", places.joined, "", of=places.clear),
         Figure("lost_volume", 1000 * places.lost_m3, "L"),
-        Figure("watched_pairs", int(matrix.watched.sum()), "", of=len(matrix)),
-        Figure("undecided_pairs", int((matrix.state == "undecided").sum()), ""),
     )

@@ -275,7 +275,5 @@ def _figures(asked: list[model.ProgramSummary]) -> tuple[Figure, ...]:
     return (
         Figure("programs_passed", sum(each.outcome == "pass" for each in asked), "", of=len(asked)),
         Figure("instructions_passed", sum(each.passed for each in asked), "", of=instructions),
-        Figure("instructions_caution", sum(each.caution for each in asked), ""),
-        Figure("instructions_failed", sum(each.failed for each in asked), ""),
         Figure("least_clearance", min(clear, default=None), "mm"),
     )

@@ -463,7 +463,7 @@ def _summary(
     gaps = (*(gap for each in safe for gap in each.gaps), *gaps_of_orientations(robot, turned))
     return model.TrajectorySummary(
         verdict=_verdict(paths, skipped, assumed_shapes).with_assumed_shapes(assumed_shapes),
-        figures=_figures(paths, length, used, assumed_shapes),
+        figures=_figures(paths, used, assumed_shapes),
         characteristic_length_m=length,
         near=model.NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm),
         joint_limits=used,
@@ -580,9 +580,7 @@ def _verdict(paths: list[model.PathSummary], skipped: list[model.PathNotFollowed
     return Verdict(status, counts)
 
 
-def _figures(
-    paths: list[model.PathSummary], length: float, limits: model.LimitsUsed, shapes: Finding | None
-) -> tuple[Figure, ...]:
+def _figures(paths: list[model.PathSummary], limits: model.LimitsUsed, shapes: Finding | None) -> tuple[Figure, ...]:
     asked = [path for path in paths if path.meant_safe]  # demonstrations are counted apart
     events = [event for path in asked for event in path.singularities]
     speeds = [
@@ -595,7 +593,6 @@ def _figures(
     return (
         Figure("safe", sum(model.is_safe(path, shapes) for path in asked), "", of=len(asked)),
         Figure("singular_poses", sum(event.crossing for event in events), ""),
-        Figure("near_passes", sum(not event.crossing for event in events), ""),
         Figure("colliding", colliding, ""),
         Figure("max_joint_speed", speed, unit),
         Figure(
@@ -603,7 +600,6 @@ def _figures(
             speed / limit if speed is not None and limit is not None else None,
             "",
         ),
-        Figure("characteristic_length", length * 1000, "mm"),
     )
 
 

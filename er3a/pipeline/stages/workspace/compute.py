@@ -137,7 +137,7 @@ def _summary(
     bar = proven.proof.bar
     return model.WorkspaceSummary(
         verdict=judged.with_assumed_shapes(assumed if examined else None),
-        figures=_figures(reach, voids, volume, settings.samples),
+        figures=_figures(reach, voids, volume),
         samples=settings.samples,
         volume_m3=volume,
         proof=model.ProofSummary(
@@ -195,7 +195,7 @@ def _in_solids(robot: Robot, scene: Scene | None, found: model.Placement | None)
         yield Open("tray_inside", tuple(named))
 
 
-def _figures(reach: ReachExtremes, voids: Sequence[Void], volume: model.Bounds, samples: int) -> tuple[Figure, ...]:
+def _figures(reach: ReachExtremes, voids: Sequence[Void], volume: model.Bounds) -> tuple[Figure, ...]:
     enclosed = [void.lower for void in voids if void.kind == "enclosed"]
     return (
         Figure("greatest_reach", reach.furthest_from_axis * 1000, "mm"),
@@ -203,5 +203,4 @@ def _figures(reach: ReachExtremes, voids: Sequence[Void], volume: model.Bounds, 
         Figure("volume_lower", volume.lower, "m³"),
         Figure("volume_upper", volume.upper, "m³"),
         Figure("least_reach", reach.nearest_to_axis * 1000, "mm"),
-        Figure("samples", samples, ""),
     )
