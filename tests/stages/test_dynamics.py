@@ -248,8 +248,7 @@ def test_limits_that_are_guessed_settle_nothing(full, tmp_path, group, need):
 def test_limits_that_no_path_was_held_against_are_no_pass(full):
     summary = full[1].results.summary
     shown = [
-        PathTorques(replace(each, counts=False), False, TorqueRows.empty(), None, np.empty((6, 2)), None)
-        for each in summary.paths
+        PathTorques(replace(each, counts=False), False, TorqueRows.empty(), None, np.empty(6)) for each in summary.paths
     ]
     verdict = verdict_of(shown, summary.holding, summary.uses, (), (), summary.masses)
     assert (verdict.status, verdict.finding.not_run) == ("caution", tuple(each.name for each in summary.paths))
