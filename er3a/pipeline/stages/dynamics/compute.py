@@ -500,7 +500,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         holding=holding,
         motors=motors,
         uses=uses,
-        checked=_checked(paths, rest, settings) if moving else (),
+        checked=_checked(paths, rest, settings) if moving and uses else (),
         assumed=(
             *(each for each in rest if each.reason not in GAPS),
             *_mounting(study, name),

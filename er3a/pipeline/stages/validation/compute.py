@@ -208,7 +208,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         round_trips=trips,
         counts=counts_of(checks),
         evidence=evidence,
-        checked=_covered(trips, evidence),
+        checked=_covered(bool(sets), trips, evidence),
         assumed=tuple(_assumed(checks, study.robot(name), robot)),
     )
     return model.ValidationResults(
@@ -219,12 +219,14 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     )
 
 
-def _covered(trips: model.RoundTripErrors | None, evidence: model.TableEvidence | None) -> tuple[Coverage, ...]:
-    """Of the table's entries how many documents settle, of poses solved back how many were found."""
+def _covered(
+    documents: bool, trips: model.RoundTripErrors | None, evidence: model.TableEvidence | None
+) -> tuple[Coverage, ...]:
+    """Of the table's entries how many documents settle, if there are any; of poses solved back how many were found."""
     parts = [part for part in evidence.parts if part.part in OF_THE_TOOL] if evidence else []
     settled = sum(part.entries if part.status == "settled" else part.settled for part in parts)
     entries = sum(part.entries for part in parts)
-    asked: dict[Check, tuple[int, int]] = {"table": (settled, entries)}
+    asked: dict[Check, tuple[int, int]] = {"table": (settled, entries)} if documents else {}
     gaps = [Open("unsettled")] if settled < entries else []
     return coverages(asked | ({"round_trips": (trips.poses, trips.poses)} if trips else {}), gaps)
 
