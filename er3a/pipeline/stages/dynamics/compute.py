@@ -500,7 +500,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         holding=holding,
         motors=motors,
         uses=uses,
-        checked=_checked(paths, rest, settings) if moving and uses else (),
+        checked=_checked(paths, rest, settings, bool(uses)) if moving else (),
         assumed=(
             *(each for each in rest if each.reason not in GAPS),
             *_mounting(study, name),
@@ -542,10 +542,12 @@ def _worst_grade(grades: list[Grade]) -> Grade:
     return max(grades, key=order.index, default="official")
 
 
-def _checked(paths: Sequence[PathTorques], rest: tuple[Open, ...], settings: DynamicsSettings) -> tuple[Coverage, ...]:
-    """What the checks cover of the paths that are given to be run."""
+def _checked(
+    paths: Sequence[PathTorques], rest: tuple[Open, ...], settings: DynamicsSettings, limited: bool
+) -> tuple[Coverage, ...]:
+    """What the checks cover of the paths that are given to be run; torques only if a motor's limit is known."""
     own = [path for path in paths if path.asked]
-    of, counts = (sum(path.summary.counts for path in own), len(own)), (len(own), len(own))
+    of, counts = (sum(path.summary.counts and limited for path in own), len(own)), (len(own), len(own))
     elsewhere = not ON_EARTH[0] <= settings.gravity_m_s2 <= ON_EARTH[1]
     not_run = tuple(path.summary.name for path in own if not path.summary.counts)
     gaps = [*rest, *([Open("gravity", amount=settings.gravity_m_s2)] if elsewhere else [])]

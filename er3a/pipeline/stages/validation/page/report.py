@@ -150,7 +150,8 @@ def _pictured(
         reach = AxisDistance(**each.subject.params)
         _, q = search(robot, reach, REACH_STARTS)
         _mark_behind(robot, reach, q, cells)
-        evidence["legend"].append(("open behind", tr("in this reach")))
+        if cells:
+            evidence["legend"].append(("open behind", tr("in this reach")))
     arms = [seen_arm(robot, tr("This table"), tr("stretched out") if disputed else "", q=q)]
     if other is not None:
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), q=q))
