@@ -81,7 +81,7 @@ WORDS: dict[str, Any] = {
     "no_number": N_("{joint} needs a number, in degrees."),
     "no_length": N_("{joint} needs a number, in millimetres."),
     "zero": N_("Zero pose"),
-    "apart": N_("flange {off} off"),
+    "flange_off": N_("flange {off} off"),
     "copied": N_("The joints are copied: {text}"),
     "link_copied": N_("The link to this pose is copied."),
     "not_copied": N_("This browser does not let pages copy; copy it from here: {text}"),

@@ -40,7 +40,7 @@ export class ArmView extends Space {
       const [from, to] = [poses, right].map((own) => column(own.at(-1), 3));
       other.shown.show(right, new Map(), look);
       this.keepClear(alongArm(right), ARM * reach);
-      nearest = { from, to, text: data.words.apart.replace("{off}", `${(1000 * Math.hypot(...subtract(to, from))).toFixed(0)} mm`), touching: [] };
+      nearest = { from, to, text: data.words.flange_off.replace("{off}", `${(1000 * Math.hypot(...subtract(to, from))).toFixed(0)} mm`), touching: [] };
     }
     if (nearest?.text) this.#nearest(nearest);
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);

@@ -644,7 +644,7 @@ const choose = (row, play, t) => {
 for (const row of rows) row.addEventListener("click", () => (row.dataset.play ? choose(row, row.dataset.play, row.dataset.t) : mark(row)));
 addEventListener("hashchange", () => rows.filter((row) => !row.dataset.play && row.hash === location.hash).forEach(mark)); // as by the one thing to do
 const [named, asked] = [addressed(), new URLSearchParams(location.search)];
-mark(playing(asked.get("play"), asked.get("t")) ?? rows.find((row) => row.querySelector("b").textContent === named || row.hash === location.hash) ?? playing(named || document.querySelector(".player")?.dataset.opened) ?? rows[0]);
+mark(playing(asked.get("play"), asked.get("t")) ?? rows.find((row) => row.querySelector("b").textContent === named || row.hash === location.hash) ?? (location.hash.startsWith("#cell-") ? undefined : playing(named || document.querySelector(".player")?.dataset.opened) ?? rows[0]));
 const follow = ({ detail }) => rows.some((row) => row.ariaCurrent && row.dataset.play === detail) || (entryOf(location.hash) === detail ? mark(playing(detail)) : choose(playing(detail), detail));
 addEventListener("player", () => addEventListener("motion", follow)); // the first one is not of the reader's choice
 

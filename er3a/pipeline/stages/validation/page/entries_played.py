@@ -27,7 +27,7 @@ from er3a.robots.robot import Robot
 JOG = 30.0  # deg, or mm of a joint that slides
 STEPS, LASTS_S = 13, 2.0
 TIP_M = 0.2  # from the flange to a mark on it, where it turns in its place
-LOOKED_FROM = (np.pi, -np.pi / 2)  # azimuth of the eye: from behind the arm, and from its right side
+LOOKED_FROM = (-np.pi / 2, np.pi)  # azimuth of the eye: from the arm's right side, and from behind
 LENGTHS, ANGLES, LIMITS = ("a", "d"), ("alpha", "beta", "offset"), ("lower", "upper")
 
 

@@ -222,7 +222,7 @@ def _steps(contradicted: int, first: Sequence[ListRow], jogs: Sequence[ListRow])
     then = [replace(row, fix=Fix(row.name, row.address, instead=False)) for row in first[1:]]
     return [
         {"title": first[0].name, "beside": tr("if wrong: {off}", off=first[0].note), "rows": jogs},
-        {"title": tr("Then"), "beside": "", "rows": then},
+        {"title": tr("Then"), "counted": False, "rows": then},
     ]
 
 
