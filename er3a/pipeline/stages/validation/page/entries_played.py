@@ -10,20 +10,23 @@ import numpy as np
 
 from er3a.finding import Finding
 from er3a.identifiability.entries import column_of
-from er3a.kinematics.forward import forward
+from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.references import entry_word, motion_seen
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, address_of, at_rest
+from er3a.pipeline.stages.validation.model import Conflict
 from er3a.pipeline.viewing.answer import Fix, ListRow
 from er3a.pipeline.viewing.side_view import entry_places
 from er3a.pipeline.viewing.still import AZIMUTH, ELEVATION, axes_of
+from er3a.references.quantities import FRAME_OF_POINT, MM, AxisDistance
 from er3a.references.seen import SeenMotion
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
+REACH, BELOW = "reach", 0.15  # the motion's name; of the reach, from one line to the next below the arm
 JOG = 30.0  # deg, or mm of a joint that slides
 STEPS, LASTS_S = 13, 2.0
 TIP_M = 0.2  # from the flange to a mark on it, where it turns in its place
@@ -44,6 +47,23 @@ def jog_rows(robot: Robot, looks: Iterable[Finding]) -> list[ListRow]:
         fix = Fix(say(look), address_of("validation", look.entry, 0.0, ""), instead=False)
         rows.append(ListRow("caution", _asked(look), note, f"#cell-{look.entry}", (look.entry, LASTS_S), fix=fix))
     return rows
+
+
+def reach_played(robot: Robot, reach: AxisDistance, q: Reals, conflict: Conflict) -> PlayedMotion:
+    """The arm as far out as it reaches at joint values (n,), rad or m, over what documents state of that: for each a
+    line from axis 1 on, with its source."""
+    T = frames(robot, q)
+    start, axis = T[0, :3, 3], T[0, :3, 2]
+    way = T[FRAME_OF_POINT[reach.point], :3, 3] - start
+    height, far = way @ axis, way - (way @ axis) * axis
+    marks = []
+    for row, stated in enumerate(conflict.statements, 1):
+        below = start + (height - row * BELOW * np.linalg.norm(far)) * axis
+        end = below + stated.expected / MM * far / np.linalg.norm(far)
+        text = joined([with_unit(fixed(stated.expected, 1), conflict.unit), own_title(stated.document)], ": ")
+        marks.append(replace(_line(below, end), t0=0.0, t1=1.0, text=text))
+    said = joined([say(conflict.subject), with_unit(fixed(conflict.measured, 1), conflict.unit)], ": ")
+    return at_rest(robot, REACH, said, q=q, marks=marks, turned=LOOKED_FROM[0] - AZIMUTH, elevation=0.0)
 
 
 def entries_played(robot: Robot, cells: Mapping[str, Any], looks: Iterable[Finding]) -> list[PlayedMotion]:

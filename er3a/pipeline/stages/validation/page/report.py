@@ -22,11 +22,12 @@ from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.references import entry_word
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES
+from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
-from er3a.pipeline.stages.validation.page.entries_played import LENGTHS, entries_played, jog_rows
+from er3a.pipeline.stages.validation.page.entries_played import LENGTHS, REACH, entries_played, jog_rows, reach_played
 from er3a.pipeline.stages.validation.page.evidence_section import (
     cells_of,
     evidence_section,
@@ -47,9 +48,7 @@ from er3a.pipeline.viewing.side_view import (
     UPRIGHT,
     DrawnLine,
     Label,
-    LabelKind,
     beyond,
-    dimension,
     entry_lines,
     flanges_off,
     seen_arm,
@@ -59,10 +58,7 @@ from er3a.references.predict import REACH_STARTS, search
 from er3a.references.quantities import AxisDistance
 from er3a.robots.robot import Robot
 
-BELOW = 0.15  # of a reach: from one line to the next below the base
 LONGER_M, MATTERS = 1e-3, 0.1  # what a length is changed by, and the part of it by which a reach changes that it is in
-LARGER, GLASS = 10, 0.8  # the difference between what documents state, in a glass of this radius, of such a step
-ROUND = np.linspace(0.0, 2 * np.pi, 49)
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
     N_("Check"),
@@ -143,48 +139,29 @@ def _pictured(
 
     Of a table that is contradicted the arm is drawn over the one that documents describe, and lengths that are wrong
     are named; where each entry is seen is marked while it is asked for, with what the other arm has instead. Where
-    documents contradict each other about a reach, the arm is stretched, and what each states is a dimension from axis 1
-    on below it, with its source; that of the table in its colour."""
-    cells, looks, q = cells_of(evidence), evidence.get("looks", ()), np.zeros(robot.joints)
-    for each in disputed[:1]:
-        reach = AxisDistance(**each.subject.params)
-        _, q = search(robot, reach, REACH_STARTS)
-        _mark_behind(robot, reach, q, cells)
-        if cells:
-            evidence["legend"].append(("open behind", tr("in this reach")))
-    arms = [seen_arm(robot, tr("This table"), tr("stretched out") if disputed else "", q=q)]
+    documents contradict each other about a reach, the arm is stretched at first, over what each states."""
+    cells, looks = cells_of(evidence), evidence.get("looks", ())
+    arms = [seen_arm(robot, tr("This table"), "")]
     if other is not None:
-        arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), q=q))
+        arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm")))
     off = flanges_off(arms)
-    if not (off or disputed):
-        motions = entries_played(robot, cells, looks)
+    if not off:
+        motions, rows = entries_played(robot, cells, looks), jog_rows(robot, looks)
+        for each in disputed[:1]:
+            reach = AxisDistance(**each.subject.params)
+            _, q = search(robot, reach, REACH_STARTS)
+            motions.insert(0, reach_played(robot, reach, q, each))
+            fix = _to_measure(each)
+            rows.insert(0, ListRow("conflict", say(each.subject), f"{_stated(each)}?", "", (REACH, 1.0), fix=fix))
+            _mark_behind(robot, reach, q, cells)
+            if cells:
+                evidence["legend"].append(("open behind", tr("in this reach")))
         picture = player(robot, motions, opened=(motions[0].name, float(motions[0].t[-1])))
-        return {"picture": picture, "drawing_head": drawing_head(), "jogs": jog_rows(robot, looks)}
-    arms = [arms[0], replace(arms[-1], kind="wrong")] if off else arms[-1:]
+        return {"picture": picture, "drawing_head": drawing_head(), "jogs": rows}
+    arms = [arms[0], replace(arms[-1], kind="wrong")]
     own = arms[-1]
-    labels, over = list[Label](), list[DrawnLine]()
-    for each in disputed:
-        step, kinds = BELOW * each.measured, dict[float, LabelKind]()
-        for row, stated in enumerate(each.statements, 1):
-            kind: LabelKind = "right" if stated.met else "open"
-            kinds[stated.expected] = kind
-            text = joined([with_unit(fixed(stated.expected, 1), each.unit), own_title(stated.document)], ": ")
-            labels.append(Label(text, np.array([0.0, -step * row]), kind, "seen", written_there=True))
-            over += dimension(stated.expected, -step * (row + 0.5), own.points_mm[-1, 1], kind)
-        ends = np.array([stated.expected for stated in each.statements])[[0, -1]]
-        seen = np.array([ends.mean(), 1.5 * step])
-        glass = seen - [3 * step, 0]
-        ring = np.column_stack([np.cos(ROUND), np.sin(ROUND)]) * step * GLASS
-        over += [
-            DrawnLine(at, "dimension") for at in (seen + ring / LARGER, glass + ring, np.array([glass + ring[0], seen]))
-        ]
-        for end, way in zip(ends, (1, -1)):
-            line = glass + [[LARGER * (end - seen[0]), up * step / 2] for up in (way, -way)]
-            over.append(DrawnLine(line, "dimension " + kinds[end]))
-            labels.append(Label(fixed(end, 1), line[0] + [-step / 4, way * step / 2], kinds[end], written_there=True))
-        text = tr("{far}, {times} times larger", far=with_unit(fixed(np.ptp(ends), 1), each.unit), times=LARGER)
-        labels.append(Label(text, glass - [step, 1.4 * step], "open", "seen", written_there=True))
-    lines, right = entry_lines(robot, cells, q), entry_lines(other, cells, q) if off and other else {}
+    labels, over, q = list[Label](), list[DrawnLine](), np.zeros(robot.joints)
+    lines, right = entry_lines(robot, cells, q), entry_lines(other, cells, q) if other else {}
     for entry, cell in cells.items():
         column, kind, gives = column_of(entry), cell["look"], cell["gives"]
         if column in "ad" and kind == "wrong":
@@ -247,15 +224,22 @@ def _answer(
             f"../{instead}/validation.html",
         )
     elif disputed:
-        stated = joined([fixed(value, 1) for value in values], " or ")
-        fix = Fix(
-            tr("measure the {subject}: {values} mm?", subject=say(disputed[0].subject), values=stated), instead=False
-        )
+        fix = _to_measure(disputed[0])
     elif is_one(found, "validation.left_open") and found.next_measurement:
         fix = Fix(to_settle(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
         fix = Fix(tr("read five poses at the pendant: er3a confirm {robot} --plan", robot=robot), instead=False)
     return replace(_headline(summary, bad, unsure), keys=keys, fix=fix)
+
+
+def _stated(conflict: model.Conflict) -> str:
+    """What documents state of a disputed reach, in one clause."""
+    return with_unit(joined([fixed(stated.expected, 1) for stated in conflict.statements], tr(" or ")), conflict.unit)
+
+
+def _to_measure(conflict: model.Conflict) -> Fix:
+    text = tr("measure the {subject}: {values}?", subject=say(conflict.subject), values=_stated(conflict))
+    return Fix(text, address_of("validation", REACH, 0.0, ""), instead=False)
 
 
 def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> Answer:
