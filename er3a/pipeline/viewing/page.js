@@ -628,7 +628,7 @@ const mark = (shown, part = shown) => {
   if (!fix || fix.toggleAttribute("hidden", !part?.dataset.fix)) return;
   const { lead, fix: advice, instead, go } = part.dataset;
   fix.querySelector("b").textContent = lead;
-  fix.querySelector("span").lastChild.data = ` ${advice}`;
+  fix.querySelector("span").replaceChildren(fix.querySelector("b"), ` ${advice}`);
   const link = fix.querySelector("a");
   if (instead) [link.href, link.textContent] = [instead, go];
   link.hidden = !instead || (link.hash === shown.hash && !instead.includes("?")); // nothing else is there to be shown

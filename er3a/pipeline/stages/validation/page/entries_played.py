@@ -51,7 +51,7 @@ def jog_rows(robot: Robot, looks: Iterable[Finding]) -> list[ListRow]:
 
 def reach_played(robot: Robot, reach: AxisDistance, q: Reals, conflict: Conflict) -> PlayedMotion:
     """The arm as far out as it reaches at joint values (n,), rad or m, over what documents state of that: for each a
-    line from axis 1 on, with its source."""
+    line from axis 1 on."""
     T = frames(robot, q)
     start, axis = T[0, :3, 3], T[0, :3, 2]
     way = T[FRAME_OF_POINT[reach.point], :3, 3] - start
@@ -60,9 +60,9 @@ def reach_played(robot: Robot, reach: AxisDistance, q: Reals, conflict: Conflict
     for row, stated in enumerate(conflict.statements, 1):
         below = start + (height - row * BELOW * np.linalg.norm(far)) * axis
         end = below + stated.expected / MM * far / np.linalg.norm(far)
-        text = joined([with_unit(fixed(stated.expected, 1), conflict.unit), own_title(stated.document)], ": ")
+        text = with_unit(fixed(stated.expected, 1), conflict.unit)
         marks.append(replace(_line(below, end), t0=0.0, t1=1.0, text=text))
-    said = joined([say(conflict.subject), with_unit(fixed(conflict.measured, 1), conflict.unit)], ": ")
+    said = joined(joined([own_title(each.document), fixed(each.expected, 1)], ": ") for each in conflict.statements)
     return at_rest(robot, REACH, said, q=q, marks=marks, turned=LOOKED_FROM[0] - AZIMUTH, elevation=0.0)
 
 

@@ -152,7 +152,9 @@ def _pictured(
             _, q = search(robot, reach, REACH_STARTS)
             motions.insert(0, reach_played(robot, reach, q, each))
             fix = _to_measure(each)
-            rows.insert(0, ListRow("conflict", say(each.subject), f"{_stated(each)}?", "", (REACH, 1.0), fix=fix))
+            rows.insert(
+                0, ListRow("conflict", say(each.subject).capitalize(), f"{_stated(each)}?", "", (REACH, 1.0), fix=fix)
+            )
             _mark_behind(robot, reach, q, cells)
             if cells:
                 evidence["legend"].append(("open behind", tr("in this reach")))
