@@ -147,9 +147,8 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     if lost:
         but["envelopes"] = f", but for shapes of {', '.join(lost)}, which are left out or as the links look"
     if changed:
-        but["inertia"] = (
-            f", but for the inertia of link {urdf_tree.some(changed)}, for which the nearest possible one was taken"
-        )
+        which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
+        but["inertia"] = f", but for the inertia of {which}, for which the nearest possible one was taken"
     more = {
         group: Source(
             f"As {path.name} states it{but.get(group, '')}",
@@ -232,7 +231,7 @@ def _robot_of_chain(
         )
     robot = Robot(
         name=robot_name(path),
-        title=path.stem.removesuffix(".urdf")[:200],
+        title=path.stem[:200] or sources[0].name,
         convention="standard",
         lower=held[:, 0],
         upper=held[:, 1],
@@ -258,7 +257,7 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
     -------
     place : of a link's name its frame (4, 4) in that of the chain's base and the number of moving joints before it;
         None for a link that does not move with the chain. What moves by itself on the last link, such as fingers,
-        counts as fixed at 0, or at the limit next to it; with ``carried`` all that hangs on a link that moves
+        counts as fixed where it is at 0; with ``carried`` all that hangs on a link that moves
     """
     above = {joint.child: joint for joint in found.all.values()}
     name = found.joints[0].parent
@@ -274,10 +273,9 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
 
     def placed(name: str, carried: bool) -> tuple[Reals, int] | None:
         behind, kept, led_on = np.eye(4), False, False
-        while name not in place and (joint := above.get(name)):
-            kept, led_on = kept or joint.moves, led_on or joint.name in led
-            at_rest = np.fmin(np.fmax([0.0], joint.lower), joint.upper)
-            behind, name = joint.T_parent_joint @ _motion(joint, at_rest)[0] @ behind, joint.parent
+        while name not in place and name in above:
+            kept, led_on = kept or above[name].moves, led_on or above[name].name in led
+            behind, name = above[name].T_parent_joint @ behind, above[name].parent
         if name not in place or (kept and not (place[name][1] if carried else place[name][1] == last and not led_on)):
             return None
         return place[name][0] @ behind, place[name][1]
@@ -595,7 +593,7 @@ def _unrounded(
     moved = 1000 * float(np.linalg.norm(away, axis=1).max())
     if moved < SHOWN_MM:
         return ()
-    taken_as = f"rounded angles (joints: {count}) were taken as multiples of 45 deg"
+    taken_as = f"rounded angles of {count} joint{'s' if count > 1 else ''} were taken as multiples of 45 deg"
     return (f"{taken_as}: that moves the flange by up to {moved:.2g} mm",)
 
 
@@ -640,8 +638,11 @@ def assumed_pairs(robot: Robot) -> str:
     -------
     note : one sentence; empty where a document gives all shapes
     """
-    rests = "pairs are disabled by shapes that no document gives: with other shapes they may meet"
-    return rests if arm_shapes(robot).assumed else ""
+    shapes = arm_shapes(robot)
+    if not shapes.assumed:
+        return ""
+    made = "the robot's file assumes, or gives in part" if shapes.given else "er3a guesses from the table"
+    return f"pairs are disabled by shapes that {made}: with other shapes they may meet"
 
 
 def pairs_not_checked(robot: Robot) -> tuple[str, ...]:

@@ -308,14 +308,8 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
 
 def _notes_of(tree: Tree, joints: Sequence[UrdfJoint]) -> Iterator[str]:
     """The notes on joints, one for all joints of which the same is said, and one on those beyond the last."""
-    link = joints[-1].child if joints else ""
-    moving = [
-        each.name
-        for each in tree.by_name.values()
-        if each.moves and link in [above.parent for above in tree.up_from(each.child)]
-    ]
-    if moving:
-        yield f"beyond the last link {link} joints stay at 0 or the limit next to it, as of a gripper: {some(moving)}"
+    if joints and (moving := tree.onward(link := joints[-1].child)[0]):
+        yield f"beyond the last link {link} joints stay at 0, as of a gripper: {some([each.name for each in moving])}"
     yield from by_note([(note, joint.name) for joint in joints for note in joint.notes])
 
 

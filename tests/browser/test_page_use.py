@@ -472,7 +472,7 @@ def test_what_is_to_be_done_next_is_shown_in_the_picture(browser, small_study):
     browser.execute_script("document.querySelector('.fix a').click()")
     WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(OUTLINED) == "#cell-direction1")
     told = "return document.querySelector('.now-shown').textContent"
-    assert browser.execute_script(told).startswith("+J1")
+    WebDriverWait(browser, PAUSE).until(lambda page: page.execute_script(told).startswith("+J1"))
     for entry, words in (("lower3", "lower limit 3"), ("d4", ""), ("direction4", "+J4")):
         browser.execute_script(f"document.querySelector('.grid a[href$=cell-{entry}]').click()")
         WebDriverWait(browser, PAUSE).until(lambda page, cell=f"#cell-{entry}": page.execute_script(OUTLINED) == cell)

@@ -68,9 +68,9 @@ def test_names_resolve_after_files_of_that_name(tmp_path, monkeypatch):
 
 
 def test_a_study_says_where_the_numbers_are_from():
-    arm = arm_of("irb120", "mine")
+    arm = arm_of("irb120")
     sources = arm.robot.sources
-    assert (arm.robot.name, sources["dh"].grade) == ("mine", "export")
+    assert (arm.robot.name, sources["dh"].grade) == ("irb120", "export")
     assert "abb_irb120_support" in arm.text
 
 

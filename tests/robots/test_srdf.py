@@ -40,7 +40,7 @@ def test_pairs_left_to_check_are_those_that_are_watched(name, tmp_path):
 
 @pytest.mark.parametrize(
     ("grade", "told"),
-    [("cad", ""), ("inferred", "by shapes that no document gives"), (None, "by shapes that no document gives")],
+    [("cad", ""), ("inferred", "by shapes that the robot's file assumes"), (None, "by shapes that er3a guesses from")],
 )
 def test_pairs_that_rest_on_assumed_shapes_say_so(grade, told, tmp_path):
     arm = load_robot("er3_600").replace(name="arm", references=())

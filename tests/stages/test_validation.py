@@ -392,8 +392,8 @@ def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_views_are_written_for_each_robot(study, stored, tmp_path, name):
     page = page_of(study, stored[name], tmp_path)
-    assert page.count('class="arms"') == int(name != "er3a_c60")  # what is wrong, from the side; or else the arm moves
-    assert page.count('id="player"') == int(name == "er3a_c60")
+    assert page.count('class="arms"') == int(name == "er3a_c60_article")  # what is wrong, or else the arm moves
+    assert page.count('id="player"') == int(name != "er3a_c60_article")
     assert not re.search(r"\bnan\b", page)
 
 
@@ -461,8 +461,9 @@ def test_a_reach_that_documents_contradict_each_other_about_is_drawn_and_asked_f
     """And for the other arm the entry that is asked for is in the table beside the picture."""
     for name, disputed in {"er3_600": True, "er3a_c60": False}.items():
         page = page_of(study, stored[name], tmp_path)
-        (address,) = re.findall(r'class="button" href="#?([\w-]*)"', page)
-        assert page.count(f'id="{address}"') == (not disputed)
+        (address,) = re.findall(r'class="button" href="([^"]*)"', page)
+        assert (f"play={name}" in address) == disputed
+        assert page.count(f'id="{address[1:]}"') == (not disputed)
         assert ("592.8 or 600.0 mm?</span>" in page) == disputed
 
 

@@ -26,7 +26,7 @@ from er3a.references.seen import SeenMotion
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-REACH, BELOW = "reach", 0.15  # the motion's name; of the reach, from one line to the next below the arm
+BELOW = 0.15  # of the reach, from one line to the next below the arm
 JOG = 30.0  # deg, or mm of a joint that slides
 STEPS, LASTS_S = 13, 2.0
 TIP_M = 0.2  # from the flange to a mark on it, where it turns in its place
@@ -51,7 +51,7 @@ def jog_rows(robot: Robot, looks: Iterable[Finding]) -> list[ListRow]:
 
 def reach_played(robot: Robot, reach: AxisDistance, q: Reals, conflict: Conflict) -> PlayedMotion:
     """The arm as far out as it reaches at joint values (n,), rad or m, over what documents state of that: for each a
-    line from axis 1 on."""
+    line from axis 1 on. It has the robot's name."""
     T = frames(robot, q)
     start, axis = T[0, :3, 3], T[0, :3, 2]
     way = T[FRAME_OF_POINT[reach.point], :3, 3] - start
@@ -62,8 +62,11 @@ def reach_played(robot: Robot, reach: AxisDistance, q: Reals, conflict: Conflict
         end = below + stated.expected / MM * far / np.linalg.norm(far)
         text = with_unit(fixed(stated.expected, 1), conflict.unit)
         marks.append(replace(_line(below, end), t0=0.0, t1=1.0, text=text))
-    said = joined(joined([own_title(each.document), fixed(each.expected, 1)], ": ") for each in conflict.statements)
-    return at_rest(robot, REACH, said, q=q, marks=marks, turned=LOOKED_FROM[0] - AZIMUTH, elevation=0.0)
+    said = joined(
+        joined([own_title(each.document), with_unit(fixed(each.expected, 1), conflict.unit)], ": ")
+        for each in conflict.statements
+    )
+    return at_rest(robot, robot.name, said, q=q, marks=marks, turned=LOOKED_FROM[0] - AZIMUTH, elevation=0.0)
 
 
 def entries_played(robot: Robot, cells: Mapping[str, Any], looks: Iterable[Finding]) -> list[PlayedMotion]:

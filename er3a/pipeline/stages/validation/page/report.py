@@ -27,7 +27,7 @@ from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
-from er3a.pipeline.stages.validation.page.entries_played import LENGTHS, REACH, entries_played, jog_rows, reach_played
+from er3a.pipeline.stages.validation.page.entries_played import LENGTHS, entries_played, jog_rows, reach_played
 from er3a.pipeline.stages.validation.page.evidence_section import (
     cells_of,
     evidence_section,
@@ -151,9 +151,12 @@ def _pictured(
             reach = AxisDistance(**each.subject.params)
             _, q = search(robot, reach, REACH_STARTS)
             motions.insert(0, reach_played(robot, reach, q, each))
-            fix = _to_measure(each)
+            fix = _to_measure(robot.name, each)
             rows.insert(
-                0, ListRow("conflict", say(each.subject).capitalize(), f"{_stated(each)}?", "", (REACH, 1.0), fix=fix)
+                0,
+                ListRow(
+                    "conflict", say(each.subject).capitalize(), f"{_stated(each)}?", "", (robot.name, 1.0), fix=fix
+                ),
             )
             _mark_behind(robot, reach, q, cells)
             if cells:
@@ -226,7 +229,7 @@ def _answer(
             f"../{instead}/validation.html",
         )
     elif disputed:
-        fix = _to_measure(disputed[0])
+        fix = _to_measure(robot, disputed[0])
     elif is_one(found, "validation.left_open") and found.next_measurement:
         fix = Fix(to_settle(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
@@ -239,9 +242,9 @@ def _stated(conflict: model.Conflict) -> str:
     return with_unit(joined([fixed(stated.expected, 1) for stated in conflict.statements], tr(" or ")), conflict.unit)
 
 
-def _to_measure(conflict: model.Conflict) -> Fix:
+def _to_measure(robot: str, conflict: model.Conflict) -> Fix:
     text = tr("measure the {subject}: {values}?", subject=say(conflict.subject), values=_stated(conflict))
-    return Fix(text, address_of("validation", REACH, 0.0, ""), instead=False)
+    return Fix(text, address_of("validation", robot, 0.0, ""), instead=False)
 
 
 def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> Answer:
