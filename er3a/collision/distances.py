@@ -38,7 +38,7 @@ HULL, CYLINDER, HALF_SPACE = 0, 1, 2
 WORLD = -1  # link of the bodies around the arm
 DEEPEST = 512  # boxes that wait at one time
 FREE, MEETS, UNDECIDED = 0, 1, 2
-LIKELY = 3  # places of a move at which it is tried first
+LIKELY = (0.5, 0.25, 0.75)  # shares of a move at which it is tried first
 NARROW = 1e-6  # m; a box in which bodies move by less is not halved
 BEYOND = (
     1e-3  # m; surfaces are measured so much farther than settles a box, as what is returned may be no more than that
@@ -355,13 +355,13 @@ def keeps_margin(layout: Layout, start: Reals, end: Reals, margin: float, swing:
     keeps : where it mostly does not is tried first
     """
     room, near, placed, at = np.empty((ROOM, 3)), np.zeros((2, 3)), unplaced(layout), -1
-    share, tried = 0.0, 0 if swing > 0 else LIKELY
-    while tried < LIKELY or share < 1.0:
-        now = (0.5, 0.25, 0.75)[tried] if tried < LIKELY else share
+    share, tried = 0.0, 0 if swing > 0 else len(LIKELY)
+    while tried < len(LIKELY) or share < 1.0:
+        now = LIKELY[tried] if tried < len(LIKELY) else share
         clear, at, inside = _smallest(layout, start + now * (end - start), at, placed, room, near)
         if inside or clear < margin:
             return False
-        if tried >= LIKELY:
+        if tried >= len(LIKELY):
             share += max((clear - margin) / swing, least) if swing > 0 else 1.0
         tried += 1
     clear, at, inside = _smallest(layout, end, at, placed, room, near)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,7 @@ from er3a.robots.robot import Robot
 
 BELOW = 0.15  # of the reach, from one line to the next below the arm
 JOG = 30.0  # deg, or mm of a joint that slides
-STEPS, LASTS_S = 13, 2.0
+LASTS_S, SHARE = 2.0, np.linspace(0.0, 1.0, 13)  # of a motion, and of its way
 TIP_M = 0.2  # from the flange to a mark on it, where it turns in its place
 LOOKED_FROM = (-np.pi / 2, np.pi)  # azimuth of the eye: from the arm's right side, and from behind
 LENGTHS, ANGLES, LIMITS = ("a", "d"), ("alpha", "beta", "offset"), ("lower", "upper")
@@ -61,7 +60,7 @@ def reach_played(robot: Robot, reach: AxisDistance, q: Reals, conflict: Conflict
         below = start + (height - row * BELOW * np.linalg.norm(far)) * axis
         end = below + stated.expected / MM * far / np.linalg.norm(far)
         text = with_unit(fixed(stated.expected, 1), conflict.unit)
-        marks.append(replace(_line(below, end), t0=0.0, t1=1.0, text=text))
+        marks.append(_mark(below, end, text))
     said = joined(
         joined([own_title(each.document), with_unit(fixed(each.expected, 1), conflict.unit)], ": ")
         for each in conflict.statements
@@ -89,13 +88,11 @@ def entries_played(robot: Robot, cells: Mapping[str, Any], looks: Iterable[Findi
             end = zero.copy()
             joint = int(entry.removeprefix(column)) - 1
             end[joint] = getattr(robot, column)[joint]
-            share = np.linspace(0.0, 1.0, STEPS)
             said_there = [PlayedEvent(0.0, LASTS_S, said, "plain")]
-            found.append(PlayedMotion(entry, "", LASTS_S * share, share[:, None] * end, said_there, turned=0.0))
+            found.append(PlayedMotion(entry, "", LASTS_S * SHARE, SHARE[:, None] * end, said_there, turned=0.0))
         elif column in LENGTHS or column in ANGLES:
-            (x, y, z), last = (places[entry] / 1000).tolist()
-            mark = Mark(0.0, 1.0, (x, y, z), tuple(last), said)
-            found.append(at_rest(robot, entry, q=zero, marks=[mark], turned=0.0))
+            start, last = places[entry] / MM
+            found.append(at_rest(robot, entry, q=zero, marks=[_mark(start, last, said)], turned=0.0))
     return found or [at_rest(robot, robot.name, q=zero)]
 
 
@@ -118,20 +115,18 @@ def _jogged(robot: Robot, look: Finding) -> PlayedMotion:
     return PlayedMotion(
         look.entry,
         "",
-        np.linspace(0.0, LASTS_S, STEPS),
-        start + np.linspace(0.0, 1.0, STEPS)[:, None] * jog,
+        LASTS_S * SHARE,
+        start + SHARE[:, None] * jog,
         [PlayedEvent(0.0, LASTS_S, _asked(look), "caution", joints=((look.joint, ""),))],
-        [*map(_said_at, ends, words), *(map(_line, T[:, :3, 3], ends) if turning else ())],
+        [
+            *(_mark(end, end, word, LASTS_S) for end, word in zip(ends, words)),
+            *(_mark(foot, end, "", LASTS_S) for foot, end in zip(T[:, :3, 3], ends) if turning),
+        ],
         ghosts=[start - jog],
         turned=seen - AZIMUTH,
     )
 
 
-def _said_at(place: Reals, word: str) -> Mark:
-    x, y, z = place.tolist()
-    return Mark(LASTS_S, LASTS_S, (x, y, z), (x, y, z), word)
-
-
-def _line(start: Reals, end: Reals) -> Mark:
-    x, y, z = start.tolist()
-    return replace(_said_at(end, ""), start=(x, y, z))
+def _mark(start: Reals, end: Reals, text: str, since: float = 0.0) -> Mark:
+    (x, y, z), (u, v, w) = start.tolist(), end.tolist()
+    return Mark(since, LASTS_S, (x, y, z), (u, v, w), text)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from math import pi
 from typing import Any
@@ -71,11 +71,12 @@ DIFFERS = 2e-3
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 
 
-def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
+def evidence_section(evidence: TableEvidence | None, behind: Collection[str] = ()) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
     legend, and the entries in words; the addresses of rows are names of entries. Those
     not settled come by how far the tool may be off, then those without a bound, then those that don't move it;
-    ``first``: the worst of those that evidence contradicts, or else what to do."""
+    ``first``: the worst of those that evidence contradicts, or else what to do. ``behind``: entries that a disputed
+    reach is made of."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in evidence.entries}
@@ -90,11 +91,13 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     todo = {each.entry: proposals[each.entry] for each in evidence.proposals if not is_one(each, "look_at_motion")}
     counts = Counter(LOOKS[each.trust] for each in evidence.entries if each.value is not None)
     present = {each.trust for each in numbers}
+    legend = [(look, tr(text, count=counts[look])) for look, text in LEGEND.items() if counts[look]]
     first = [ListRow("fail", entry_word(each.entry), _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence, todo) for kind in kinds]) for joint in joints],
-        legend=[(look, tr(text, count=counts[look])) for look, text in LEGEND.items() if counts[look]],
+        legend=[*legend, *([("open behind", tr("in this reach"))] if behind else [])],
+        behind=behind,
         meanings=[
             (look, _status(status), word("status_meaning", STATUS_MEANINGS, status))
             for status, look in LOOKS.items()
@@ -108,7 +111,7 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     )
 
 
-def cells_of(section: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def cells_of(section: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """What :func:`evidence_section` says of each entry, by its name."""
     return {cell["entry"]: cell for _, row in section.get("rows", ()) for cell in row if cell}
 
@@ -245,7 +248,6 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, proposals: Mappin
         gives=_other_given(each, evidence),
         said=_said(each, evidence, proposals),
         unsure=len(each.by) == 1,
-        behind=False,
     )
 
 

@@ -14,7 +14,6 @@ from er3a.files.robot_writer import robot_file, robot_text
 from er3a.finding import is_one
 from er3a.identifiability.entries import column_of
 from er3a.kinematics.forward import frames
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr, unit_sign, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured
@@ -22,7 +21,7 @@ from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.references import entry_word
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES
-from er3a.pipeline.player.motions import address_of
+from er3a.pipeline.player.motions import PlayedMotion, address_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
@@ -100,10 +99,11 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     corrected, _ = diagnosis_section.corrected_robot(table, summary.diagnoses)
     text = robot_text(robot_file(corrected)) if corrected and not summary.is_beyond_correction else ""
     instead = alternative_table(study, stored.robot, stored.folder) if summary.verdict.status == "fail" else None
-    evidence = evidence_section(summary.evidence)
     disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
     other = study.robot(instead) if instead else other_robot(robot, summary.evidence)
-    pictured = _pictured(robot, other, evidence or {}, disputed)
+    asked = [_Asked(robot, each) for each in disputed[:1]]
+    evidence = evidence_section(summary.evidence, [name for each in asked for name in each.lengths])
+    pictured = _pictured(robot, other, evidence or {}, asked)
     render_stage(
         study,
         stored,
@@ -114,6 +114,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
             summary.evidence.contradicted if summary.evidence else 0,
             (evidence or {}).get("first", ()),
             pictured["jogs"],
+            pictured["asked"],
         ),
         at_side=True,
         plain_table=None if evidence else plain_table(robot),
@@ -132,7 +133,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
 
 
 def _pictured(
-    robot: Robot, other: Robot | None, evidence: Mapping[str, Any], disputed: Sequence[model.Conflict]
+    robot: Robot, other: Robot | None, evidence: Mapping[str, Any], asked: Sequence[_Asked]
 ) -> dict[str, Any]:
     """What the page shows at its left: the arm, which goes where an entry is asked for; or else from the side, at one
     scale, what is wrong of it.
@@ -146,23 +147,10 @@ def _pictured(
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm")))
     off = flanges_off(arms)
     if not off:
-        motions, rows = entries_played(robot, cells, looks), jog_rows(robot, looks)
-        for each in disputed[:1]:
-            reach = AxisDistance(**each.subject.params)
-            _, q = search(robot, reach, REACH_STARTS)
-            motions.insert(0, reach_played(robot, reach, q, each))
-            fix = _to_measure(robot.name, each)
-            rows.insert(
-                0,
-                ListRow(
-                    "conflict", say(each.subject).capitalize(), f"{_stated(each)}?", "", (robot.name, 1.0), fix=fix
-                ),
-            )
-            _mark_behind(robot, reach, q, cells)
-            if cells:
-                evidence["legend"].append(("open behind", tr("in this reach")))
+        motions = [*(each.motion for each in asked), *entries_played(robot, cells, looks)]
         picture = player(robot, motions, opened=(motions[0].name, float(motions[0].t[-1])))
-        return {"picture": picture, "drawing_head": drawing_head(), "jogs": rows}
+        rows = [each.row for each in asked]
+        return {"picture": picture, "drawing_head": drawing_head(), "asked": rows, "jogs": jog_rows(robot, looks)}
     arms = [arms[0], replace(arms[-1], kind="wrong")]
     own = arms[-1]
     labels, over, q = list[Label](), list[DrawnLine](), np.zeros(robot.joints)
@@ -177,32 +165,57 @@ def _pictured(
             over.append(DrawnLine(right[entry], "mark right", entry, gives or cell["value"]))
     labels += off
     drawn = side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=beyond(arms), over=over)
-    return {"picture": drawn, "drawing_head": "", "jogs": []}
+    return {"picture": drawn, "drawing_head": "", "asked": [], "jogs": []}
 
 
-def _mark_behind(robot: Robot, reach: AxisDistance, q: Reals, cells: Mapping[str, dict[str, Any]]) -> None:
-    """Mark the lengths of the table that a reach is made of, at joint values (n,), rad or m."""
-    for entry, cell in cells.items():
-        column = column_of(entry)
-        if column in LENGTHS:
-            longer = getattr(robot, column).copy()
-            longer[int(entry.removeprefix(column)) - 1] += LONGER_M
-            ends = [reach.measure(frames(arm, q)) for arm in (robot, robot.replace(**{column: longer}))]
-            cell["behind"] = bool(np.abs(np.diff(ends)) > MATTERS * LONGER_M)
+class _Asked:
+    """A reach about which documents disagree, at the joint values (n,) where the table reaches farthest."""
+
+    def __init__(self, robot: Robot, conflict: model.Conflict) -> None:
+        self.robot, self.conflict = robot, conflict
+        self.reach = AxisDistance(**conflict.subject.params)
+        _, self.q = search(robot, self.reach, REACH_STARTS)
+
+    @property
+    def motion(self) -> PlayedMotion:
+        return reach_played(self.robot, self.reach, self.q, self.conflict)
+
+    @property
+    def row(self) -> ListRow:
+        name, fix = self.robot.name, _to_measure(self.robot.name, self.conflict)
+        said = say(self.conflict.subject).capitalize()
+        return ListRow("conflict", said, f"{_stated(self.conflict)}?", "", (name, 1.0), fix=fix)
+
+    @property
+    def lengths(self) -> list[str]:
+        """The lengths of the table that the reach is made of."""
+        found, before = [], self.reach.measure(frames(self.robot, self.q))
+        for column in LENGTHS:
+            for row in range(self.robot.rows):
+                longer = getattr(self.robot, column).copy()
+                longer[row] += LONGER_M
+                after = self.reach.measure(frames(self.robot.replace(**{column: longer}), self.q))
+                if abs(after - before) > MATTERS * LONGER_M:
+                    found.append(f"{column}{row + 1}")
+        return found
 
 
-def _steps(contradicted: int, first: Sequence[ListRow], jogs: Sequence[ListRow]) -> list[dict[str, Any]]:
-    """The list at the table's side: the worst entries, or what to confirm; of the first step each joint, where the
-    picture shows them."""
+def _steps(
+    contradicted: int, first: Sequence[ListRow], jogs: Sequence[ListRow], asked: Sequence[ListRow]
+) -> list[dict[str, Any]]:
+    """The list at the table's side: the worst entries; or what to measure, as sources disagree, and what to confirm, of
+    the first step each joint, where the picture shows them."""
     if not first:
         return []
     if contradicted:
         title = tr("The {shown} worst of {all} wrong entries", shown=len(first), all=contradicted)
         return [{"title": title, "beside": tr("at worst, tool off by"), "rows": first}]
+    before = [{"title": tr("Sources disagree."), "counted": False, "rows": asked}] if asked else []
     if not jogs:
-        return [{"title": tr("Confirm in this order"), "beside": tr("if wrong, tool off by"), "rows": first}]
+        return [*before, {"title": tr("Confirm in this order"), "beside": tr("if wrong, tool off by"), "rows": first}]
     then = [replace(row, fix=Fix(row.name, row.address, instead=False)) for row in first[1:]]
     return [
+        *before,
         {"title": first[0].name, "beside": tr("if wrong: {off}", off=first[0].note), "rows": jogs},
         {"title": tr("Then"), "counted": False, "rows": then},
     ]
