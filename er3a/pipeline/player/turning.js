@@ -6,9 +6,10 @@ import three from "er3a/three";
 
 const STEPS = 65535; // that the box is divided into
 const FLOOR = 14; // lines of the floor, along what is seen
-const NEAR = 0.95; // of the distance that all is seen from: where a tray is
+const NEAR = 1.1; // of the distance that all is seen from: where a tray is
+const SIDES = [0.9, 0.5, 1.3, -0.9, -0.5, -1.3, 0.9]; // rad, from which a tray is looked at: the first where nothing hides the arm
 const SPARSE = 20; // one of so many points of a void keeps words off it
-const AWAY = 0.3; // of its opacity what is reachable keeps before a tray
+const AWAY = 0.8; // of its opacity what is reachable keeps before a tray
 const THROUGH = { transparent: true, depthWrite: false, side: three.DoubleSide };
 
 const place = document.getElementById("turning");
@@ -36,13 +37,18 @@ function placeOf({ points, shapes }) {
   return points ? points.reduce((a, b) => (b[2] > a[2] ? b : a)) : add(column(shapes[0].T, 3), [0, 0, shapes[0].size[2] / 2]);
 }
 
-/** Turns the picture until what is chosen is before the rest: a tray from its side, with the arm in it. */
+/** Turns the picture until what is chosen is before the rest: a tray from its side, with the arm in it and nothing before the arm. */
 function face(chosen) {
   shown = chosen;
   const at = placeOf(shown);
   const [[x, y], near] = [subtract(at, middle), Boolean(shown.shapes)];
   const about = Math.hypot(x, y) < 0.1 * size[0]; // axis 1
-  Object.assign(space, { azimuth: about ? data.azimuth : Math.atan2(y, x) + (near ? 0.9 : 0.35), elevation: 0.35, distance: (near || about ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
+  Object.assign(space, { elevation: 0.35, distance: (near || about ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
+  for (const turn of near ? SIDES : [0.35]) {
+    space.azimuth = about ? data.azimuth : Math.atan2(y, x) + turn;
+    space.begin();
+    if (!near || !solids.slice(1).some(({ address, parts }) => !address && space.hiding(parts, shown.reached, ARM * size[0]).size)) break;
+  }
   refresh();
 }
 

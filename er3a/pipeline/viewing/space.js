@@ -171,10 +171,9 @@ export class Space extends Orbit {
     return [this.width / 2 + zoom * dot(from, this.eye.right), this.height / 2 - zoom * dot(from, this.eye.up), depth];
   }
 
-  /** Which of the shapes around the arm hide one of its `poses`, or the middle between two: these are drawn pale. */
-  hiding(meshes, poses) {
-    const origins = poses.map((T) => column(T, 3));
-    const points = [...origins, ...origins.slice(1).map((origin, k) => scaled(add(origin, origins[k]), 0.5))];
+  /** Which of the shapes around the arm hide it, at its `poses`, or what is within `radius` (m) of it: these are drawn pale. */
+  hiding(meshes, poses, radius = 0) {
+    const points = alongArm(poses).flatMap((at) => [-radius, radius].map((far) => add(at, scaled(this.eye.right, far))));
     const rays = points.map((point) => {
       const way = subtract(point, this.eye.position);
       const length = Math.hypot(...way);
