@@ -10,6 +10,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined
+from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import outlines
@@ -46,7 +47,7 @@ def from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, tra
     (left, below), (right, above) = (1000 * corner[:2] for corner in tray.corners)
     corners = np.array([[left, below], [right, below], [right, above], [left, above]])
     parts.append(Markup('<polygon class="tray" points="{}"/>').format(_line(corners)))
-    said = joined([tr("tray"), with_unit(tray.edges, "mm")], ", ")
+    said = joined([tr("tray"), with_unit(f"({millimetres(tray.place.centre_m)})", "mm")], " ")
     words.append(_word(np.array([(left + right) / 2, below - height]), height, said, "tray", size))
     x, y = 1000 * np.array(tray.place.centre_m[:2])
     parts.append(Markup('<path class="way" d="M0,0H{:.0f}V{:.0f}"/>').format(x, -y))
