@@ -27,7 +27,7 @@ const unjudged = document.querySelector(".answer .no_verdict") && { events: [], 
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const floor = data.floor ?? column(table.base, 3)[2];
 
-let [motion, t, playing, last, awaited] = [motions.values().next().value, 0, false, 0, false];
+let [motion, t, playing, last, awaited] = [motions.values().next().value, 0, false, 0, 0];
 let apart = ""; // how far the tool of a wrong table is from that of the other, now
 
 const space = new Space(canvas, data.target, data.length, refresh);
@@ -78,12 +78,11 @@ function play(on) {
 }
 
 function refresh() {
-  if (!awaited) requestAnimationFrame(frame);
-  awaited = true;
+  cancelAnimationFrame(awaited);
+  awaited = requestAnimationFrame(frame);
 }
 
 function frame(now) {
-  awaited = false;
   if (playing) {
     const until = playedUntil();
     if (now - last > SLOW) space.fineness = 0.5;
@@ -120,7 +119,7 @@ function draw() {
   space.taken.push([offsetLeft + offsetWidth / 2, offsetTop + offsetHeight / 2, offsetWidth, offsetHeight]);
   space.floor(column(table.base, 3), data.size / 10, floor);
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
-  arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value));
+  arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value, Boolean(wrong && k === 0)));
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
   const others = wrong ? [] : motion.ghosts.map((q) => posesOf(arms[0], q));
   const shades = motion.events.map(({ status }) => data.colours[status] ?? page.muted);

@@ -10,7 +10,6 @@ const NEAR = 1.1; // of the distance that all is seen from: where a tray is
 const SIDES = [0.9, 0.5, 1.3, -0.9, -0.5, -1.3, 0.9]; // rad, from which a tray is looked at: the first where nothing hides the arm
 const SPARSE = 20; // one of so many points of a void keeps words off it
 const AWAY = 0.8; // of its opacity what is reachable keeps before a tray
-const THROUGH = { transparent: true, depthWrite: false, side: three.DoubleSide };
 
 const place = document.getElementById("turning");
 const data = JSON.parse(document.getElementById("turning-figure").textContent);
@@ -18,14 +17,13 @@ const [canvas, key, knife] = ["canvas", ".key", ".cut"].map((name) => place.quer
 const [low, high] = data.box.map((corner) => scaled(corner, 1e-3)); // m
 const size = subtract(high, low);
 const middle = scaled(add(low, high), 0.5);
-let awaited = false;
+let awaited = 0; // the next frame
 
 const space = new Space(canvas, middle, data.filled * Math.hypot(...size), refresh);
 const plane = new three.Plane(new three.Vector3(0, 1, 0));
 const solids = data.solids.map((each) => ({ ...each, parts: space.add(each.shapes) }));
 const layers = data.layers.map(made);
 const whole = space.distance;
-Object.assign(space, { azimuth: data.azimuth, elevation: data.elevation });
 
 const all = [...layers, ...solids];
 const unlisted = all.filter(({ address }) => !address);
@@ -57,8 +55,8 @@ function bytes(text) {
 }
 
 function refresh() {
-  if (!awaited) requestAnimationFrame(draw);
-  awaited = true;
+  cancelAnimationFrame(awaited);
+  awaited = requestAnimationFrame(draw);
 }
 
 /** A layer with its points (m) and what three.js draws of it. */
@@ -82,7 +80,7 @@ function body({ faces, colour, cut }, points) {
   const corners = new Uint32Array(bytes(faces).buffer);
   const geometry = surface(points, [...corners]);
   geometry.computeVertexNormals();
-  const look = { color: colour, roughness: 0.7, ...THROUGH };
+  const look = { color: colour, roughness: 0.7, transparent: true, depthWrite: false, side: three.DoubleSide };
   if (!cut) return [new three.Mesh(geometry, new three.MeshStandardMaterial({ ...look, opacity: 0.85, depthWrite: true }))];
   const clippingPlanes = [plane];
   const sides = [[three.BackSide, three.IncrementWrapStencilOp], [three.FrontSide, three.DecrementWrapStencilOp]].map(([side, stencilZPass]) => {
@@ -99,7 +97,6 @@ function body({ faces, colour, cut }, points) {
 }
 
 function draw() {
-  awaited = false;
   plane.constant = -low[1] - Number(knife.value) * size[1];
   space.begin();
   space.floor(middle, size[0] / FLOOR, data.floor);

@@ -34,7 +34,7 @@ let listed = false;
 let lastListed = -Infinity;
 let lastMoved = -Infinity;
 let search = null; // for solutions, by iteration
-let awaited = false;
+let awaited = 0; // the next frame
 let linkTimer = 0;
 
 const view = new ArmView(byId("arm"), data, links, refresh);
@@ -185,12 +185,11 @@ function showRow() {
 
 /** Has the next frame show the arm as it then is. */
 function refresh() {
-  if (!awaited) requestAnimationFrame(frame);
-  awaited = true;
+  cancelAnimationFrame(awaited);
+  awaited = requestAnimationFrame(frame);
 }
 
 function frame(now) {
-  awaited = false;
   const T = frames(table, links, q);
   view.show(q, ghost, showRow(), data.wrong ? null : clearance.show(T), byId("looks")?.value);
   showPose(T.at(-1));

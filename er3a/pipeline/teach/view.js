@@ -28,7 +28,7 @@ export class ArmView extends Space {
     const colours = new Map((data.wrong ? poses.map((_, j) => (j ? `link_${j}` : "base")) : [...touching]).map((name) => [name, data.colours.touching]));
     this.begin();
     this.floor(base, reach / 10, data.floor ?? base[2]);
-    this.arm.show(poses, colours, look);
+    this.arm.show(poses, colours, look, Boolean(data.wrong)); // the right one is seen in it
     if (ghost) this.other.show(this.#poses(ghost), new Map(), look, true);
     else this.other.hide();
     const hiding = this.hiding(this.surroundings, poses);
