@@ -92,7 +92,13 @@ def entries_played(robot: Robot, cells: Mapping[str, Any], looks: Iterable[Findi
             found.append(PlayedMotion(entry, "", LASTS_S * SHARE, SHARE[:, None] * end, said_there, turned=0.0))
         elif column in LENGTHS or column in ANGLES:
             start, last = places[entry] / MM
-            found.append(at_rest(robot, entry, q=zero, marks=[_mark(start, last, said)], turned=0.0))
+            marks = [_mark(start, last, said)]
+            if column in ANGLES and cell["gives"]:
+                other = getattr(robot, column).copy()
+                other[int(entry.removeprefix(column)) - 1] = np.radians(float(cell["gives"].replace("−", "-")))
+                T = np.stack([forward(each, zero) for each in (robot, robot.replace(**{column: other}))])
+                marks = _choice(T[:, :3, 3], _tips(T), (cell["value"], cell["gives"]))
+            found.append(at_rest(robot, entry, q=zero, marks=marks, turned=0.0))
     return found or [at_rest(robot, robot.name, q=zero)]
 
 
@@ -107,24 +113,34 @@ def _jogged(robot: Robot, look: Finding) -> PlayedMotion:
     jog = meant(robot, JOG * np.eye(robot.joints)[joint])
     T = forward(robot, np.stack([start + jog, start - jog]))
     turning = SeenMotion(look.pose_deg, look.joint, look.point, look.seen).manner != "moves"
-    marks = T[:, :3, 3] + TIP_M * np.moveaxis(T[:, :3, :3], 2, 0) if turning else T[None, :, :3, 3]
-    ends = max(marks, key=lambda each: float(np.linalg.norm(each[0] - each[1])))
+    ends = _tips(T) if turning else T[:, :3, 3]
     seen = max(LOOKED_FROM, key=lambda each: float(np.linalg.norm(axes_of(each, ELEVATION)[:2] @ (ends[0] - ends[1]))))
     own = int(robot.direction[joint])
-    words = tr("keep {value}", value=fixed(own, 0)), tr("enter {value}", value=fixed(-own, 0))
     return PlayedMotion(
         look.entry,
         "",
         LASTS_S * SHARE,
         start + SHARE[:, None] * jog,
         [PlayedEvent(0.0, LASTS_S, _asked(look), "caution", joints=((look.joint, ""),))],
-        [
-            *(_mark(end, end, word, LASTS_S) for end, word in zip(ends, words)),
-            *(_mark(foot, end, "", LASTS_S) for foot, end in zip(T[:, :3, 3], ends) if turning),
-        ],
+        _choice(T[:, :3, 3], ends, (fixed(own, 0), fixed(-own, 0)), LASTS_S),
         ghosts=[start - jog],
         turned=seen - AZIMUTH,
     )
+
+
+def _tips(T: Reals) -> Reals:
+    """The ends (2, 3), m, of marks on a flange at two poses (2, 4, 4): along that of its axes which turns most."""
+    marks = T[:, :3, 3] + TIP_M * np.moveaxis(T[:, :3, :3], 2, 0)
+    found: Reals = max(marks, key=lambda each: float(np.linalg.norm(each[0] - each[1])))
+    return found
+
+
+def _choice(feet: Reals, ends: Reals, values: tuple[str, str], since: float = 0.0) -> list[Mark]:
+    """Where an entry's value leads to, and another one instead: words at ``ends`` (2, 3), lines to these from ``feet``
+    (2, 3), m."""
+    words = tr("keep {value}", value=values[0]), tr("enter {value}", value=values[1])
+    dots = [_mark(end, end, word, since) for end, word in zip(ends, words)]
+    return dots + [_mark(foot, end, "", since) for foot, end in zip(feet, ends) if (foot != end).any()]
 
 
 def _mark(start: Reals, end: Reals, text: str, since: float = 0.0) -> Mark:
