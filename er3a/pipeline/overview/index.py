@@ -109,10 +109,7 @@ def _changed_text(verdicts: Iterable[StageVerdict]) -> str:
         return ""
     named = [tr(each) if each in (THE_SETTINGS, THE_CODE) else each for each in names[:MAX_CHANGED]]
     more = ["…"] * (len(names) > MAX_CHANGED)
-    return tr(
-        "Changed since, so what stands here tells of what was before (run the study again): {names}.",
-        names=joined([*named, *more], ", "),
-    )
+    return tr("Made before {names} changed: run the study again.", names=joined([*named, *more], ", "))
 
 
 def _computed(study: Study, name: str, folder: Path) -> Results:

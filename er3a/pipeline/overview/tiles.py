@@ -90,7 +90,7 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     good = [row for row in rows if row.mark == "pass" and row.play]
     others = [row for row in rows if row.mark != "pass"]
     page = f"{name}/{found.stage}.html"
-    asked = tr("In the model: {what}", what=what)
+    asked = tr("Which {what} pass?", what=what)
     return Tile(asked, said.headline, sound, page, rows=others[:FEW], all=len(others), heading=said.rest, good=good)
 
 

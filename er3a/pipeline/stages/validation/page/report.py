@@ -216,8 +216,8 @@ def _steps(
     then = [replace(row, fix=Fix(row.name, row.address, instead=False)) for row in first[1:]]
     return [
         *before,
-        {"title": first[0].name, "beside": tr("if wrong: {off}", off=first[0].note), "rows": jogs},
-        {"title": tr("Then"), "counted": False, "rows": then},
+        {"title": f"❶ {first[0].name}", "beside": tr("if wrong, up to {off}", off=first[0].note), "rows": jogs},
+        {"title": "", "rows": then},
     ]
 
 
