@@ -191,7 +191,7 @@ function tellLoads(poses) {
   const loads = valuesAt(motion.times, motion.loads, t);
   loads.forEach((load, j) => {
     if (Number.isNaN(load)) return;
-    const felt = Math.abs(load) > 0.01 * most; // what is not is told in grey, without a bar
+    const felt = Math.abs(load) > 0.3 * most; // what is not is told in grey, without a bar
     space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt ? Math.abs(load) / most : null);
   });
 }
