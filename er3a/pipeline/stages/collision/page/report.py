@@ -91,17 +91,13 @@ def _answer(
     )
     failing = sum(row.mark == "no_reference" for row in clear)
     counted = (
-        (N_("{count} more clear, but failing at Paths."), failing),
+        (N_("{count} of the clear ones fail at Paths."), failing),
         (N_("{count} paths can't be reached whole."), len(partly)),
         (N_("{count} targets collide in every solution."), blocked := len(params.get("blocked", ()))),
     )
-    sound = len(clear) - failing
-    paths = sum(each.kind == "path" for each, row in zip(closest, rows) if row in clear) - failing
     caught = len(params.get("demonstrations", ()))
-    due = len(rows) + blocked - caught - len(partly) - failing
-    headline = tr("{count} of {due} poses and paths clear.", count=sound, due=due)
-    if due == sound > 0:
-        headline = tr("{poses} poses and {paths} paths clear.", poses=due - paths, paths=paths)
+    due = len(rows) + blocked - caught - len(partly)
+    headline = tr("{count} of {due} poses and paths clear.", count=len(clear), due=due)
     keys = [
         (with_unit(fixed(each.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=each.name))
         for each in closest

@@ -96,7 +96,7 @@ def evidence_section(evidence: TableEvidence | None, behind: Collection[str] = (
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence, todo) for kind in kinds]) for joint in joints],
-        legend=[*legend, *([("open behind", tr("in this reach"))] if behind else [])],
+        legend=[*legend, *([("open behind", tr("set this reach"))] if behind else [])],
         behind=behind,
         meanings=[
             (look, _status(status), word("status_meaning", STATUS_MEANINGS, status))

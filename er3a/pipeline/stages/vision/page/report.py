@@ -198,7 +198,7 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     if least and least.grasp and least.error_mm:
         made = joined([tr("in 95 % of grasps"), tr("simulated") if found and found.simulated else ""], ", ")
         asked = {"least": 100 * summary.least_success, "limit": limit, "turn": turn}
-        allowed = tr("{name}: {least:g} % needed within {limit:g} mm, {turn:g}°", name=least.name, **asked)
+        allowed = tr("{name}: grasps within {limit:g} mm, {turn:g}° ({least:g} % needed)", name=least.name, **asked)
         keys = [
             (f"{fixed(100 * least.grasp.probability, 1)} %", allowed),
             (tr("{far} off", far=with_unit(fixed(least.error_mm.together, 1), "mm")), made),
