@@ -109,7 +109,7 @@ def _changed_text(verdicts: Iterable[StageVerdict]) -> str:
         return ""
     named = [tr(each) if each in (THE_SETTINGS, THE_CODE) else each for each in names[:MAX_CHANGED]]
     more = ["…"] * (len(names) > MAX_CHANGED)
-    return tr("Made before {names} changed: run the study again.", names=joined([*named, *more], ", "))
+    return tr("Made before {names} changed (run the study again).", names=joined([*named, *more], ", "))
 
 
 def _computed(study: Study, name: str, folder: Path) -> Results:
