@@ -91,7 +91,7 @@ def _answer(
     )
     failing = sum(row.mark == "no_reference" for row in clear)
     counted = (
-        (N_("{count} of the clear ones fail at Paths."), failing),
+        (N_("{count} of them fail at Paths."), failing),
         (N_("{count} paths can't be reached whole."), len(partly)),
         (N_("{count} targets collide in every solution."), blocked := len(params.get("blocked", ()))),
     )
