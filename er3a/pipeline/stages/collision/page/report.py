@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, own_title, tr, with_unit
+from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
@@ -89,12 +89,8 @@ def _answer(
         [row for row in rows if row.mark in marks]
         for marks in (("fail",), ("pass", "caution", "no_reference"), ("none",))
     )
-    failing = sum(row.mark == "no_reference" for row in clear)
-    counted = (
-        (N_("{count} of them fail at Paths."), failing),
-        (N_("{count} paths can't be reached whole."), len(partly)),
-        (N_("{count} targets collide in every solution."), blocked := len(params.get("blocked", ()))),
-    )
+    blocked = len(params.get("blocked", ()))
+    in_vain = tr("{count} targets collide in every solution.", count=blocked) if blocked else ""
     caught = len(params.get("demonstrations", ()))
     due = len(rows) + blocked - caught - len(partly)
     headline = tr("{count} of {due} poses and paths clear.", count=len(clear), due=due)
@@ -107,7 +103,7 @@ def _answer(
     return Answer(
         headline,
         all_caught(caught),
-        joined([tr(text, count=count) for text, count in counted if count], " "),
+        in_vain,
         keys,
         [
             Group(

@@ -190,7 +190,7 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         [
             Group(title, rows, counted=False)
             for title, rows in (
-                (tr("Held in the worst pose; bars to {most}", most=ends[0]), still),
+                (tr("Worst pose; bars to {most}", most=ends[0]), still),
                 (tr("Greatest torque on the paths"), moving),
             )
         ],
