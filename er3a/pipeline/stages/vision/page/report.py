@@ -134,7 +134,7 @@ def _errors(each: model.ObjectResult | None, task: VisionFile) -> list[Group]:
         text = f"{fixed(off, 2)} mm, {fixed(getattr(each.error_deg, part), 2)}°"
         parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
         rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
-    title = tr("{name}: error, 95 % of grasps; line: {limit:g} mm allowed", name=each.name, limit=limit)
+    title = tr("{name}: 95 % error; line: {limit:g} mm", name=each.name, limit=limit)
     return [Group(title, rows, counted=False)]
 
 
