@@ -3,7 +3,7 @@
 A field that a format asks for is filled with something where its value is not known: the same effort, friction or
 damping for all joints, whatever they carry; 1 kg for each link; half a turn to either side for each joint. Other values
 can't be meant as they stand: centres of mass far outside of what the same file draws of the link, as in the base's
-coordinates; or moments of inertia about the links' origins.
+coordinates; moments of inertia about the links' origins; or efforts with which the arm can't hold its own links.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import scipy
 
 from er3a.dynamics.arm_model import LinkShape, link_shapes
 from er3a.dynamics.plausibility import mass_findings
+from er3a.dynamics.torques import gravity
 from er3a.finding import is_one
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Masses
@@ -24,6 +25,8 @@ from er3a.robots.robot import Robot, Source
 ROUNDED_RAD = 2e-3  # half a turn written as 3.14
 SEVERAL = 3  # joints or links, that no maker's arm has alike
 THOUSAND = 1000.0  # N m: of no motors that are known in whole ones; generators of URDFs write them
+WITHIN = 1.25  # masses of a file may be off by a fifth, before its efforts are held to contradict them
+POSES = 1000
 OUTSIDE_M = 0.25  # m, beyond all that is drawn of a link: more than what is glued to it without a shape explains
 
 
@@ -46,6 +49,9 @@ def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
         source = Source("The file gives all joints +-180 deg, which is a placeholder", "inferred")
         robot = robot.replace(sources={**robot.sources, "limits": source})
         notes.append("the limits +-180 deg of all joints are a placeholder: what rests on limits is not settled")
+    if why := _no_masses(robot):
+        robot = robot.replace(masses=Masses(drives=robot.masses.drives))
+        notes.append(f"{why}: the masses can't be right, so no torque is judged")
     drives, why = robot.masses.drives, _no_efforts(robot)
     alike = [kind for kind in ("coulomb", "viscous") if drives and _alike(getattr(drives, kind))]
     if drives and (why or alike):
@@ -56,9 +62,6 @@ def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
         notes.append(f"{why}: a placeholder, so no torque is held against it")
     if alike:
         notes.append("all joints have the same friction or damping: a placeholder, so joints count as without")
-    if why := _no_masses(robot):
-        robot = robot.replace(masses=Masses(drives=robot.masses.drives))
-        notes.append(f"{why}: the masses can't be right, so no torque is judged")
     return robot, tuple(notes)
 
 
@@ -68,7 +71,15 @@ def _no_efforts(robot: Robot) -> str:
     if _alike(peak):
         return f"all joints have the effort {np.nanmax(peak):g}"
     round_ = peak[(peak > 0) & (peak % THOUSAND == 0)]
-    return f"joints have efforts such as {round_[0]:g}" if len(round_) >= SEVERAL else ""
+    if len(round_) >= SEVERAL:
+        return f"joints have efforts such as {round_[0]:g}"
+    if not robot.masses.links or not len(peak):
+        return ""
+    poses = np.random.default_rng(0).uniform(robot.lower, robot.upper, (POSES, robot.joints))
+    held = np.abs(gravity(robot, poses)).max(axis=0)
+    for short in np.flatnonzero(held > WITHIN * peak)[:1]:
+        return f"joint {short + 1} has the effort {peak[short]:g}, and the arm's links alone ask {held[short]:.3g}"
+    return ""
 
 
 def _alike(values: Reals) -> bool:
