@@ -645,7 +645,8 @@ def masses_from_urdf(
 ) -> tuple[Masses, tuple[str, ...], tuple[str, ...]]:
     """Bodies in the robot's frames, and what is known of its drives.
 
-    A link whose inertia no body can have keeps its mass and centre, with the nearest inertia that a body can have.
+    Links that are fixed to each other are one body. If no body can have its inertia, it keeps its mass and centre, with
+    the nearest inertia that a body can have; what the base weighs loads no joint.
 
     Parameters
     ----------
@@ -658,7 +659,7 @@ def masses_from_urdf(
     masses, notes : notes name links and what was assumed of them
     changed : links that have another inertia than the file says
     """
-    found: dict[int, list[MassBody]] = {}
+    found: dict[int, dict[str, MassBody]] = {}
     notes: list[str] = []
     changed: dict[str, str] = {}
     for name, inertials, place in in_links(root, robot, places, "inertial", carried=True):
@@ -669,26 +670,29 @@ def masses_from_urdf(
         except InputError as error:
             notes.append(f"{error.field}: {error.problem}; its mass was left out")
             continue
-        if no_body(body):
+        if body.mass > 0 or any(body.inertia):
+            placed, number = place
+            found.setdefault(number, {})[name] = moved(body, placed @ T)
+    links = []
+    for number, bodies in sorted(found.items()):
+        body = together(list(bodies.values()))
+        if number and no_body(body):
             given, body = body, nearest_body(body)
             before, after = (
                 ", ".join(f"{value:g}" for value in np.linalg.eigvalsh(each.inertia_matrix)) for each in (given, body)
             )
-            changed[name] = (
+            changed[next(iter(bodies))] = (
                 f"principal moments of inertia of {before} kg m2, which no body has: the nearest that a body can have, "
                 f"{after} kg m2, were taken"
             )
-        if body.mass > 0 or any(body.inertia):
-            placed, number = place
-            found.setdefault(number, []).append(moved(body, placed @ T))
+        links.append(LinkMass(number, body))
     if changed:
         first, *others = changed
         notes.append(f"link {first} has {changed[first]}" + (f"; likewise of {some(others)}" if others else ""))
     missing = [name for k, name in enumerate(moving) if k + 1 not in found]
     if found and missing:
         notes.append(f"no mass is given for what moves with {', '.join(missing)}")
-    links = tuple(LinkMass(number, together(bodies)) for number, bodies in sorted(found.items()))
-    return Masses(links=links, drives=drives_of(root, names)), tuple(notes), tuple(changed)
+    return Masses(links=tuple(links), drives=drives_of(root, names)), tuple(notes), tuple(changed)
 
 
 def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) -> None:

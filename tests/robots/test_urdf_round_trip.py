@@ -50,7 +50,7 @@ def arm_text(links: dict[int, str] | None = None, limits: dict[int, str] | None 
     """Five joints and a tip that stands askew on the last; ``links``, ``limits`` replace what stands in one of them."""
     text = '<robot name="r"><link name="l0"/>'
     for k, (kind, xyz, rpy, axis) in enumerate(JOINTS):
-        limit = f'<limit lower="-1.{k}" upper="2.{k}" velocity="3.{k}" effort="{50 + k}"/>'
+        limit = f'<limit lower="-1.{k}" upper="2.{k}" velocity="3.{k}" effort="{250 + k}"/>'
         text += f'<link name="l{k + 1}">{(links or {}).get(k + 1, inertial(f"2.{k}"))}</link>'
         text += f'<joint name="j{k + 1}" type="{kind}"><parent link="l{k}"/><child link="l{k + 1}"/>'
         text += f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{(limits or {}).get(k + 1, limit)}'
@@ -185,7 +185,7 @@ def test_what_a_urdf_holds_comes_back(tmp_path, random):
     shapes = {2: inertial() + BOX + BALL, 4: inertial("3") + MESH.format(file="part.obj")}
     robot = import_urdf(written(tmp_path, arm_text(shapes))).robot
     assert (len(robot.hulls), len(robot.envelopes)) == (2, 1)
-    np.testing.assert_array_equal(drives_of(robot).peak, [50, 51, 52, 53, 54])
+    np.testing.assert_array_equal(drives_of(robot).peak, [250, 251, 252, 253, 254])
     first = robot.hulls[0]
     robot = robot.replace(hulls=(ConvexPiece(0, first.points, 0.0023), *robot.hulls))
     path = exported(robot, tmp_path)
@@ -359,6 +359,17 @@ def test_an_inertia_that_no_body_has_leaves_mass_and_centre(tmp_path, random, ma
     peer = Peer(written(tmp_path, arm_text({3: inertial(mass, xx)})), found.joints, "l0", "tip")
     rest = np.zeros_like(q)
     np.testing.assert_allclose(er3a.gravity(robot, q), peer.torques(q, rest, rest), atol=1e-9)
+
+
+def test_links_fixed_to_each_other_are_judged_as_one_body(tmp_path):
+    """A finger of some grams with an inertia that no body has leaves the hand that carries it a body."""
+    wrong = '<inertial><mass value="0.01"/><inertia ixx="1e-7" iyy="1e-6" izz="4e-6" ixy="0" ixz="0" iyz="0"/></inertial>'
+    text = arm_text().replace('<link name="tip"/>', f'<link name="tip">{wrong}</link>')
+    found = import_urdf(written(tmp_path, text))
+    assert not any("principal moments" in note for note in found.notes)
+    assert found.robot.masses.body(5).mass == pytest.approx(2.41)
+    alone = import_urdf(written(tmp_path, arm_text({5: wrong, 1: wrong})))
+    assert any("link l1 has principal moments" in note and "likewise of l5" in note for note in alone.notes)
 
 
 @pytest.mark.parametrize(
