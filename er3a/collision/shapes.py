@@ -140,7 +140,10 @@ def covered_lengths(robot: Robot, shapes: ArmShapes, link: int) -> tuple[float, 
 
 def _own_lengths(robot: Robot, link: int) -> list[Reals]:
     """The ends (2, 3), m, of the straight pieces of a link that its table settles: not those of flange and tool, which
-    are no link's, nor a shift along an axis that is parallel to the one before or after it."""
+    are no link's, nor a shift along an axis that is parallel to the one before or after it. Nor those to or from a
+    joint that slides: any axis that is parallel to its own would do as well."""
+    if robot.sliding[max(link - 1, 0) : link + 1].any():
+        return []
     bare, row = robot.replace(tool=np.eye(4), flange=np.eye(4)), max(link - 1, 0)
     turns = link_parts(robot)[:, TO_NEXT_AXIS, 2, 2]
     beside = ([turns[row]] if row else []) + ([turns[row + 1]] if row + 1 < robot.rows else [])

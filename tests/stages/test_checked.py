@@ -829,6 +829,16 @@ def test_a_base_that_is_drawn_has_no_length_below_what_is_drawn_of_it():
     assert arm_shapes(arm.replace(visuals=(mesh,))).partial == ()
 
 
+def test_a_joint_that_slides_has_no_place_that_shapes_could_miss():
+    """A SCARA whose file draws its spindle where it is, and gives its axis at the base's: any parallel one would do."""
+    arm = Robot.from_dh([0.375, -0.375, 0.65, 0.0], [0.0] * 4, [0.0] * 4, sliding=[False, False, True, False])
+    ends = {1: ((0, 0, 0), (0.375, 0, 0)), 2: ((0, 0, 0), (0.275, 0, 0)), 3: ((0.65, 0, 0), (0.65, 0, 0.4))}
+    drawn = tuple(Envelope(link, *line, 0.05) for link, line in ends.items())
+    assert arm_shapes(arm.replace(envelopes=drawn)).partial == ()
+    short = Envelope(1, (0.0, 0.0, 0.0), (0.1, 0.0, 0.0), 0.05)
+    assert [link for link, _ in arm_shapes(arm.replace(envelopes=(short, *drawn[1:]))).partial] == [1]
+
+
 def test_shapes_beside_the_tables_lines_cover_their_links():
     """Housings beside their axes, as the upper arms of Universal Robots are, count as covering them."""
     ur = load_robot("ur5e")
