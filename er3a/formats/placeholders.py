@@ -3,7 +3,7 @@
 A field that a format asks for is filled with something where its value is not known: the same effort, friction or
 damping for all joints, whatever they carry; 1 kg for each link; half a turn to either side for each joint. Other values
 can't be meant as they stand: centres of mass far outside of what the same file draws of the link, as in the base's
-coordinates; moments of inertia about the links' origins; or efforts with which the arm can't hold its own links.
+coordinates, or all at the links' origins; moments of inertia about these; or efforts with which the arm can't hold its own links.
 """
 
 from __future__ import annotations
@@ -99,6 +99,8 @@ def _no_masses(robot: Robot) -> str:
     moments = [np.linalg.eigvalsh(each.body.inertia_matrix) for each in links]
     if len(moments) >= SEVERAL and np.allclose(moments, moments[0][0]):
         return f"all links have the moment of inertia {moments[0][0]:g} kg m2 about each axis"
+    if len(links) >= SEVERAL and not np.round([each.body.centre[:2] for each in links], 6).any():
+        return "the centres of mass of all links are on the axes of their own joints"
     shapes = link_shapes(robot) if links else {}
     far = {
         each.link: away

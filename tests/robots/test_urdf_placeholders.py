@@ -41,8 +41,8 @@ def test_what_may_be_meant_is_kept(tmp_path):
 
 @pytest.mark.parametrize(
     "given",
-    [{"mass": "1"}, {"centre": "0 0 1.4"}, {"about_origin": True}, {"inertia": (1, 1)}],
-    ids=["one mass for all", "centres far outside", "moments about the origin", "one inertia for all"],
+    [{"mass": "1"}, {"centre": "0 0 1.4"}, {"centre": "0 0 0"}, {"about_origin": True}, {"inertia": (1, 1)}],
+    ids=["one mass for all", "centres far outside", "no centres", "moments about the origin", "one inertia for all"],
 )
 def test_masses_that_are_none_are_left_out(tmp_path, given):
     imported = import_urdf(written(tmp_path, **given))
