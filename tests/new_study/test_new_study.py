@@ -20,6 +20,7 @@ from er3a.files.dh_table import read_dh_table
 from er3a.files.kept_files import ROOT
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot, robot_of
+from er3a.files.yaml_file import read_yaml
 from er3a.formats.urdf import export_urdf
 from er3a.kinematics.singularity import scaled_jacobian
 from er3a.pipeline.check import check_file, check_study
@@ -238,6 +239,8 @@ def test_arms_with_other_joints_get_a_study_that_holds(tmp_path, monkeypatch, ta
     write_study(arm, tmp_path / "cell")
     monkeypatch.chdir(tmp_path / "cell")
     study = check_study(Path("config/config.yaml"))
+    tray = read_yaml(Path("config/config.yaml"))["capability"]["placement"]
+    assert tray["tool_direction"] == [0, 0, -1]
     targets = compute_inverse(study, "arm").summary.targets
     assert len(targets) >= 2
     assert [target.name for target in targets if target.chosen_deg is None] == []
@@ -251,6 +254,14 @@ def test_arms_with_other_joints_get_a_study_that_holds(tmp_path, monkeypatch, ta
     header, row, *_ = [line for line in text.splitlines() if not line.startswith("#")]
     assert len(header.split(",")) == len(row.split(",")) == 1 + joints + 6
     assert [name for name in header.split(",") if name.startswith("q")] == list(joint_columns(arm.robot))
+
+
+def test_the_tray_of_an_arm_that_cannot_tilt_its_tool_is_served_as_the_tool_points(tmp_path):
+    """A SCARA whose last frame points up, as URDFs have them."""
+    (tmp_path / "arm.csv").write_text(SCARA.replace("275,180", "275,0"), encoding="utf-8")
+    write_study(arm_of(tmp_path / "arm.csv"), tmp_path / "cell")
+    tray = read_yaml(tmp_path / "cell/config/config.yaml")["capability"]["placement"]
+    assert tray["tool_direction"] == [0, 0, 1]
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from er3a.by_value import by_identity
 from er3a.errors import Er3aError
@@ -16,16 +17,19 @@ from er3a.files.reference_sets import FORMATS
 from er3a.files.robot_writer import surface_files, yaml_text
 from er3a.files.scene_file import SceneFile
 from er3a.files.yaml_file import parse, read_yaml
+from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.language import written_title
 from er3a.pipeline.new_study.arms import REFERENCES, Arm
 from er3a.pipeline.new_study.tasks import MIN_TARGETS, Spot, TaskSearch, reach_of, scenes
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.robots.robot import Robot
 
 STUDY = "config/config.yaml"
 SCENE = "data/scenes/cell.yaml"
 HELP = f"{REFERENCES}/README.md"
 SCHEMAS = ("study", "robot", "targets", "paths", "scene")
+POSES = 16  # of which no tilt that a joint makes leaves all alike
 SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
 
@@ -66,7 +70,7 @@ def write_study(arm: Arm, folder: Path) -> tuple[list[Path], str]:
         raise Er3aError(f"{folder / there[0]} is there already, and is kept; give another folder")
     found = _found(arm)
     texts = {
-        STUDY: _study(name),
+        STUDY: _study(arm.robot),
         SCENE: _with_schema("scene", found.scene),
         f"data/robots/{name}.yaml": arm.text,
         f"data/targets/{name}.yaml": _with_schema("targets", {"kind": "targets", "targets": _targets(found)}),
@@ -114,13 +118,19 @@ def _targets(found: FoundTasks) -> list[dict[str, Any]]:
     return [{"name": f"target_{k}", "note": down if spot.down else other, **spot.written} for k, spot in numbered]
 
 
-def _study(name: str) -> str:
-    """The project's own study with this robot in place of its robots, and the scene in place of its scene."""
+def _study(robot: Robot) -> str:
+    """The project's own study with this robot in place of its robots, and the scene in place of its scene. The tray is
+    served along the one direction in which an arm that can't tilt its tool holds it."""
+    name = robot.name
     text = (ROOT / STUDY).read_text(encoding="utf-8")
     robots = f"robots:\n  {name}:\n    targets: data/targets/{name}.yaml\n    paths: data/paths/{name}.yaml\n\n"
     text = re.sub(r"^robots:\n(?:[ #].*\n|\n)+", robots, text, count=1, flags=re.MULTILINE)
     text = re.sub(r"data/scenes/\w+\.yaml", SCENE, text)
     text = re.sub(r"(\n  samples: )\d+", rf"\g<1>{SAMPLES}", text, count=1)
+    poses = np.random.default_rng(0).uniform(robot.lower, robot.upper, (POSES, robot.joints))
+    pointing = forward(robot, poses)[:, :3, 2].round(6) + 0.0
+    if not np.ptp(pointing, axis=0).any():
+        text = text.replace("tool_direction: [0, 0, -1]", f"tool_direction: {pointing[0].tolist()}")
     return text.replace("The study that `make run` carries out.", "The study that `er3a run` carries out.")
 
 
