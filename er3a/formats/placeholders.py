@@ -3,7 +3,8 @@
 A field that a format asks for is filled with something where its value is not known: the same effort, friction or
 damping for all joints, whatever they carry; 1 kg for each link; half a turn to either side for each joint. Other values
 can't be meant as they stand: centres of mass far outside of what the same file draws of the link, as in the base's
-coordinates, or all at the links' origins; moments of inertia about these; or efforts with which the arm can't hold its own links.
+coordinates, or all at the links' origins; moments of inertia about these; or efforts with which the arm can't hold its
+own links.
 """
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ def test_efforts_that_are_none_are_unknown(tmp_path, effort):
 
 @pytest.mark.parametrize(("effort", "kept"), [("6{k}", False), ("7{k}", True)])
 def test_efforts_that_cannot_hold_the_links_themselves_are_none(tmp_path, effort, kept):
-    # Links of 1.5 to 4.5 kg, centres at 0.15 to 1.05 m from joint 1 when stretched level: 85.3 N m, of which four fifths are 68.3.
+    # Links of 1.5 to 4.5 kg, centres 0.15 to 1.05 m from joint 1 when level: 85.3 N m, four fifths of it 68.3.
     imported = import_urdf(written(tmp_path, effort=effort))
     assert (imported.robot.masses.drives is not None) == kept
     assert any("effort" in note for note in imported.notes) != kept

@@ -363,7 +363,8 @@ def test_an_inertia_that_no_body_has_leaves_mass_and_centre(tmp_path, random, ma
 
 def test_links_fixed_to_each_other_are_judged_as_one_body(tmp_path):
     """A finger of some grams with an inertia that no body has leaves the hand that carries it a body."""
-    wrong = '<inertial><mass value="0.01"/><inertia ixx="1e-7" iyy="1e-6" izz="4e-6" ixy="0" ixz="0" iyz="0"/></inertial>'
+    moments = '<inertia ixx="1e-7" iyy="1e-6" izz="4e-6" ixy="0" ixz="0" iyz="0"/>'
+    wrong = f'<inertial><mass value="0.01"/>{moments}</inertial>'
     text = arm_text().replace('<link name="tip"/>', f'<link name="tip">{wrong}</link>')
     found = import_urdf(written(tmp_path, text))
     assert not any("principal moments" in note for note in found.notes)
