@@ -13,11 +13,10 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
-from er3a.dynamics.arm_model import LinkShape, link_shapes
+from er3a.dynamics.arm_model import arm_model
 from er3a.dynamics.plausibility import mass_findings
-from er3a.dynamics.torques import gravity
+from er3a.dynamics.torques import worst_holding
 from er3a.finding import is_one
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Masses
@@ -27,8 +26,7 @@ ROUNDED_RAD = 2e-3  # half a turn written as 3.14
 SEVERAL = 3  # joints or links, that no maker's arm has alike
 THOUSAND = 1000.0  # N m: of no motors that are known in whole ones; generators of URDFs write them
 WITHIN = 1.25  # masses of a file may be off by a fifth, before its efforts are held to contradict them
-POSES = 1000
-OUTSIDE_M = 0.25  # m, beyond all that is drawn of a link: more than what is glued to it without a shape explains
+OUTSIDE_MM = 250.0  # beyond all that is drawn of a link: more than what is glued to it without a shape explains
 
 
 def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
@@ -76,8 +74,7 @@ def _no_efforts(robot: Robot) -> str:
         return f"joints have efforts such as {round_[0]:g}"
     if not robot.masses.links or not len(peak):
         return ""
-    poses = np.random.default_rng(0).uniform(robot.lower, robot.upper, (POSES, robot.joints))
-    held = np.abs(gravity(robot, poses)).max(axis=0)
+    held = np.abs(worst_holding(arm_model(robot)).values)
     for short in np.flatnonzero(held > WITHIN * peak)[:1]:
         return f"joint {short + 1} has the effort {peak[short]:g}, and the arm's links alone ask {held[short]:.3g}"
     return ""
@@ -102,27 +99,11 @@ def _no_masses(robot: Robot) -> str:
         return f"all links have the moment of inertia {moments[0][0]:g} kg m2 about each axis"
     if len(links) >= SEVERAL and not np.round([each.body.centre[:2] for each in links], 6).any():
         return "the centres of mass of all links are on the axes of their own joints"
-    shapes = link_shapes(robot) if links else {}
-    far = {
-        each.link: away
-        for each in links
-        if (away := _outside(robot, shapes.get(each.link), each.link, each.body.centre)) > OUTSIDE_M
-    }
-    if far:
-        link = max(far, key=far.__getitem__)
-        more = f" and {len(far) - 1} more" if len(far) > 1 else ""
-        return f"the centre of mass of link {link}{more} is {1000 * far[link]:.0f} mm outside of the link"
-    about = [found.link for found in mass_findings(robot) if is_one(found, "about_origin")] if masses else []
+    doubts = mass_findings(robot) if links else ()
+    far = {each.outside_mm: each.link for each in doubts if is_one(each, "centre_outside")}
+    if far and (most := max(far)) > OUTSIDE_MM:
+        return f"the centre of mass of link {far[most]} is {most:.0f} mm outside of the link"
+    about = [each.link for each in doubts if is_one(each, "about_origin")]
     if len(about) >= SEVERAL:
         return f"{len(about)} links have inertias about their origin, not about their centre of mass"
     return ""
-
-
-def _outside(robot: Robot, shape: LinkShape | None, link: int, centre: tuple[float, ...]) -> float:
-    """How far (m) a centre (3,) is outside of the hull of what a link is drawn with; -inf where nothing is."""
-    parts = [visual.points for visual in robot.visuals if visual.link == link]
-    parts += [shape.points] if shape and not shape.guessed else []
-    if not parts:
-        return -math.inf
-    hull = scipy.spatial.ConvexHull(np.concatenate(parts), qhull_options="QJ")
-    return float((hull.equations @ np.append(centre, 1.0)).max())

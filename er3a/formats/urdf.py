@@ -44,7 +44,6 @@ NO_SLIDE_M, MAX_SLID_M = 1.0, 100.0
 MANY_TURNS = 4 * math.pi + 0.01
 FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
-WRITTEN_RAD = 1e-9  # angles that differ by less are the same, written in all digits of a double
 REPEATS = 3e-5  # of its reach, to which an arm comes back: 0.03 mm of 1 m; less is no other arm
 MARKER_M = 2e-3  # across; a PR2 has cubes of 1 mm where frames are, a Magician one of 0.1 mm
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
@@ -583,18 +582,13 @@ def _chain_forward(joints: Sequence[urdf_tree.UrdfJoint], values: Reals) -> Real
 def _unrounded(
     written: Sequence[urdf_tree.UrdfJoint], taken: Sequence[urdf_tree.UrdfJoint], values: Reals
 ) -> tuple[str, ...]:
-    """A note on joints whose angles were taken as multiples of 45 deg, if any differ by more than printed digits of a
-    double do; ``values`` (N, m) of the moving joints, at which the flange is compared."""
-    turned = [one.T_parent_joint - other.T_parent_joint for one, other in zip(written, taken)]
-    count = sum(bool(np.abs(each).max() > WRITTEN_RAD) for each in turned)
-    if not count:
-        return ()
+    """A note on angles that were taken as multiples of 45 deg, if it moves the flange; ``values`` (N, m) of the moving
+    joints, at which it is compared."""
     before, after = (_chain_forward(each, values)[:, :3, 3] for each in (written, taken))
     moved, reach = (float(np.linalg.norm(each, axis=1).max()) for each in (before - after, before))
-    if moved < REPEATS * reach:
+    if moved <= REPEATS * reach:
         return ()
-    taken_as = f"rounded angles of {count} joint{'s' if count > 1 else ''} were taken as multiples of 45 deg"
-    return (f"{taken_as}: that moves the flange by up to {1000 * moved:.2g} mm",)
+    return (f"rounded angles were taken as multiples of 45 deg: that moves the flange by up to {1000 * moved:.2g} mm",)
 
 
 def _words(values: Reals) -> str:

@@ -677,14 +677,12 @@ def masses_from_urdf(
     for number, bodies in sorted(found.items()):
         body = together(list(bodies.values()))
         if number and no_body(body):
-            given, body = body, nearest_body(body)
-            before, after = (
-                ", ".join(f"{value:g}" for value in np.linalg.eigvalsh(each.inertia_matrix)) for each in (given, body)
-            )
+            moments = ", ".join(f"{value:g}" for value in np.linalg.eigvalsh(body.inertia_matrix))
             changed[next(iter(bodies))] = (
-                f"principal moments of inertia of {before} kg m2, which no body has: the nearest that a body can have, "
-                f"{after} kg m2, were taken"
+                f"principal moments of inertia of {moments} kg m2, which no body has: the nearest that one can have "
+                "were taken"
             )
+            body = nearest_body(body)
         links.append(LinkMass(number, body))
     if changed:
         first, *others = changed

@@ -117,7 +117,7 @@ def test_snapping_gives_the_real_arm_and_says_what_it_changed(tmp_path):
     np.testing.assert_allclose(got.a, real.a, atol=1e-12)
     np.testing.assert_allclose(got.d, [0.3215, 0, 0, 0.299, 0, 0.0785], atol=1e-12)
     np.testing.assert_allclose(got.alpha, real.alpha, atol=1e-12)
-    assert "rounded angles of 4 joints were taken as multiples of 45 deg" in imported.notes[0]
+    assert "rounded angles were taken as multiples of 45 deg" in imported.notes[0]
     assert any("continuous" in note for note in imported.notes)
     assert (got.continuous.any(), got.lower[5], got.upper[5]) == (False, -2, 2)  # as the file states them
     path = tmp_path / "arm.yaml"

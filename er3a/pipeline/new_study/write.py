@@ -17,7 +17,6 @@ from er3a.files.reference_sets import FORMATS
 from er3a.files.robot_writer import surface_files, yaml_text
 from er3a.files.scene_file import SceneFile
 from er3a.files.yaml_file import parse, read_yaml
-from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.language import written_title
 from er3a.pipeline.new_study.arms import REFERENCES, Arm
@@ -29,7 +28,6 @@ STUDY = "config/config.yaml"
 SCENE = "data/scenes/cell.yaml"
 HELP = f"{REFERENCES}/README.md"
 SCHEMAS = ("study", "robot", "targets", "paths", "scene")
-POSES = 16  # of which no tilt that a joint makes leaves all alike
 SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
 
@@ -127,8 +125,7 @@ def _study(robot: Robot) -> str:
     text = re.sub(r"^robots:\n(?:[ #].*\n|\n)+", robots, text, count=1, flags=re.MULTILINE)
     text = re.sub(r"data/scenes/\w+\.yaml", SCENE, text)
     text = re.sub(r"(\n  samples: )\d+", rf"\g<1>{SAMPLES}", text, count=1)
-    poses = np.random.default_rng(0).uniform(robot.lower, robot.upper, (POSES, robot.joints))
-    pointing = forward(robot, poses)[:, :3, 2].round(6) + 0.0
+    pointing = reach_of(robot).poses[:, :3, 2].round(6) + 0.0
     if not np.ptp(pointing, axis=0).any():
         text = text.replace("tool_direction: [0, 0, -1]", f"tool_direction: {pointing[0].tolist()}")
     return text.replace("The study that `make run` carries out.", "The study that `er3a run` carries out.")

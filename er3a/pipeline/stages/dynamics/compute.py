@@ -547,13 +547,12 @@ def _checked(
 ) -> tuple[Coverage, ...]:
     """What the checks cover of the paths that are given to be run; torques only if a motor's limit is known."""
     own = [path for path in paths if path.asked]
-    of, counts = (sum(path.summary.counts for path in own), len(own)), (len(own), len(own))
     elsewhere = not ON_EARTH[0] <= settings.gravity_m_s2 <= ON_EARTH[1]
     not_run = tuple(path.summary.name for path in own if not path.summary.counts)
     gaps = [*rest, *([Open("gravity", amount=settings.gravity_m_s2)] if elsewhere else [])]
     gaps += [Open("paths_not_run", not_run)] if not_run else []
-    asked: dict[Check, tuple[int, int]] = {"torque": of} if limited else {}
-    asked |= dict.fromkeys(("limits", *OF_MOTIONS), counts)
+    asked: dict[Check, tuple[int, int]] = {"torque": (len(own) - len(not_run), len(own))} if limited else {}
+    asked |= dict.fromkeys(("limits", *OF_MOTIONS), (len(own), len(own)))
     return coverages(asked, (each for each in gaps if each.reason in GAPS))
 
 
