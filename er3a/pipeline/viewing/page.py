@@ -249,7 +249,11 @@ def head_of(stored: Stored[Any]) -> Head:
     found = say(verdict.finding)
     text = joined([found, *listed(verdict.findings[1:])], " ")
     checked = tuple(
-        (check_name(each.check), covered_text(each), joined([gap_text(gap, None) for gap in each.gaps], ", "))
+        (
+            check_name(each.check),
+            covered_text(each),
+            "" if each.complete else joined([gap_text(gap, None) for gap in each.gaps], ", ") or covered_text(each),
+        )
         for each in summary.checked
         if each.check not in UNSAID or each.gaps
     )

@@ -551,8 +551,10 @@ def _checked(
     not_run = tuple(path.summary.name for path in own if not path.summary.counts)
     gaps = [*rest, *([Open("gravity", amount=settings.gravity_m_s2)] if elsewhere else [])]
     gaps += [Open("paths_not_run", not_run)] if not_run else []
-    asked: dict[Check, tuple[int, int]] = {"torque": (len(own) - len(not_run), len(own))} if limited else {}
-    asked |= dict.fromkeys(("limits", *OF_MOTIONS), (len(own), len(own)))
+    counts = (len(own), len(own))
+    covered = len(own) - len(not_run) if limited else 0
+    asked: dict[Check, tuple[int, int]] = {"torque": (covered, len(own)), "limits": counts}
+    asked |= dict.fromkeys(OF_MOTIONS, counts)
     return coverages(asked, (each for each in gaps if each.reason in GAPS))
 
 

@@ -151,7 +151,7 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
     if not summary.motors:
         held = model.hardest_held(summary.holding) if summary.holding else None
         if held is None:
-            return Answer(tr("Torques need the links' masses."), tr("None are given."), keys=[payload])
+            return Answer(tr("Torques need the links' masses."), tr("No usable ones are given."), keys=[payload])
         return Answer(holding_text(held), keys=[payload])
     worst = _worst(summary.motors)
     limited = _limited(summary)
