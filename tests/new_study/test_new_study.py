@@ -257,11 +257,14 @@ def test_arms_with_other_joints_get_a_study_that_holds(tmp_path, monkeypatch, ta
 
 
 def test_the_tray_of_an_arm_that_cannot_tilt_its_tool_is_served_as_the_tool_points(tmp_path):
-    """A SCARA whose last frame points up, as URDFs have them."""
-    (tmp_path / "arm.csv").write_text(SCARA.replace("275,180", "275,0"), encoding="utf-8")
+    """A small SCARA whose last frame points up, as URDFs have them."""
+    (tmp_path / "arm.csv").write_text(
+        SCARA.replace("275,180", "275,0").replace("325,0,400", "125,0,100"), encoding="utf-8"
+    )
     write_study(arm_of(tmp_path / "arm.csv"), tmp_path / "cell")
     tray = read_yaml(tmp_path / "cell/config/config.yaml")["capability"]["placement"]
     assert tray["tool_direction"] == [0, 0, 1]
+    assert tray["box_mm"] == [150, 110, 40]  # it reaches 0.5 m
 
 
 @pytest.mark.parametrize(

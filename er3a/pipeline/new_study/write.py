@@ -28,6 +28,7 @@ STUDY = "config/config.yaml"
 SCENE = "data/scenes/cell.yaml"
 HELP = f"{REFERENCES}/README.md"
 SCHEMAS = ("study", "robot", "targets", "paths", "scene")
+TRAY_MM, TRAY_FOR_M = (200, 150, 50), 0.7  # an arm of less reach is asked for a smaller tray
 SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
 
@@ -118,14 +119,18 @@ def _targets(found: FoundTasks) -> list[dict[str, Any]]:
 
 def _study(robot: Robot) -> str:
     """The project's own study with this robot in place of its robots, and the scene in place of its scene. The tray is
-    served along the one direction in which an arm that can't tilt its tool holds it."""
+    as large as fits the arm's reach, and served along the one direction in which an arm that can't tilt its tool holds
+    it."""
     name = robot.name
     text = (ROOT / STUDY).read_text(encoding="utf-8")
     robots = f"robots:\n  {name}:\n    targets: data/targets/{name}.yaml\n    paths: data/paths/{name}.yaml\n\n"
     text = re.sub(r"^robots:\n(?:[ #].*\n|\n)+", robots, text, count=1, flags=re.MULTILINE)
     text = re.sub(r"data/scenes/\w+\.yaml", SCENE, text)
     text = re.sub(r"(\n  samples: )\d+", rf"\g<1>{SAMPLES}", text, count=1)
-    pointing = reach_of(robot).poses[:, :3, 2].round(6) + 0.0
+    reach = reach_of(robot)
+    share = min(1.0, reach.radius / TRAY_FOR_M)
+    text = re.sub(r"box_mm: .*", f"box_mm: {[10 * round(share * size / 10) for size in TRAY_MM]}", text, count=1)
+    pointing = reach.poses[:, :3, 2].round(6) + 0.0
     if not np.ptp(pointing, axis=0).any():
         text = text.replace("tool_direction: [0, 0, -1]", f"tool_direction: {pointing[0].tolist()}")
     return text.replace("The study that `make run` carries out.", "The study that `er3a run` carries out.")
