@@ -85,6 +85,15 @@ def test_published_tables_get_their_name(tmp_path, table, name):
 
 
 @pytest.mark.long
+def test_a_table_of_universal_robots_has_its_controller_s_base(tmp_path):
+    """UR10e, as its maker's page gives it."""
+    a, alpha, d = (0, -612.7, -571.55, 0, 0, 0), (90, 0, 0, 90, -90, 0), (180.7, 0, 0, 174.15, 119.85, 116.55)
+    rows = [(*row, 0, 1) for row in zip(a, alpha, d)]
+    found = said(written(tmp_path / "table.csv", rows, "standard"))
+    assert (found["arm"], found["verdict"]) == ("ur10e", "equal")
+
+
+@pytest.mark.long
 def test_an_offset_left_out_is_named(tmp_path):
     rows = [(0, -90, 290, 0, 1), (270, 0, 0, 0, 1), (70, -90, 0, 0, 1), (0, 90, 302, 0, 1), (0, -90, 0, 0, 1)]
     found = said(written(tmp_path / "table.csv", [*rows, (0, 0, 72, 180, 1)], "standard"))
