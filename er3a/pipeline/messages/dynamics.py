@@ -167,7 +167,7 @@ def payload_key(summary: Summary | None, robot: Robot) -> tuple[str, str]:
         return with_unit(f"≤ {least[0]}", "kg"), tr("payload at the flange, by {limits}", limits=joined(least[1], ", "))
     wrist = robot.masses.wrist
     if wrist is not None and np.isfinite(wrist.payload):
-        return with_unit(f"{wrist.payload:.3g}", "kg"), tr("rated payload at the flange")
+        return with_unit(f"{wrist.payload:.3g}", "kg"), tr("rated at the flange, not examined")
     return tr("▲ mount nothing"), tr("payload unknown")
 
 
