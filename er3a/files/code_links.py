@@ -158,7 +158,7 @@ def _list_of(row: _Link) -> str:
 
 def _arguments(function: str, text: str) -> Cells | None:
     """A row's cells by their headings; None if the call makes no link."""
-    low, toolbox = function.lower(), _TOOLBOX.fullmatch(function)
+    low = function.lower()
     given, words, cells = Words(), Words(), Cells()
     for part in parts(_NAMED_BEFORE.sub(r"\1=", text)):
         key, is_named, value = part.partition("=")
@@ -168,19 +168,17 @@ def _arguments(function: str, text: str) -> Cells | None:
             words.append(word.lower())
         elif part:
             given.append(part)
-    if toolbox is None:
+    if not _TOOLBOX.fullmatch(function):
         return cells if is_row(cells) and not given else None
+    order = [*filter(None, _ORDERS.get(low, "").split(","))]
     if len(given) == 1 and given[0].startswith("["):
         order = words_of("alpha a theta d sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
         if len(given) < 4:
             return None
-        cells |= dict(zip(order, given))
-    elif low in _ORDERS and len(given) <= len(order := _ORDERS[low].split(",")):
-        cells |= dict(zip(order, given))
-    elif given or (low == "link" and not cells):
+    elif len(given) > len(order) or (low == "link" and not cells):
         return None
-    return _of_toolbox(low, words, cells)
+    return _of_toolbox(low, words, cells | dict(zip(order, given)))
 
 
 def _argument(key: str) -> str:

@@ -210,10 +210,8 @@ def _set_in(body: str) -> Cells:
 def _header(line: str) -> tuple[Words, str]:
     """The names that get a value in each pass of a loop, and what it goes through; of ``i, row in enumerate(rows):``,
     ``(int i = 0; i < 6; i++) {``, ``(const auto& row : rows) {``, ``(const row of rows) {`` or ``i = 1:n``."""
-    mark = next((each for each in (" in ", " of ", "=", ":") if each in line), "=")
-    names, _, over = line.partition(mark)
-    words = [re.findall(r"\w+", part) for part in names.split(",")]
-    return [part[-1] for part in words if part], over.strip(" :{")  # its type is before a name
+    names, over = [*re.split(" in | of |=|:", line, maxsplit=1), ""][:2]
+    return re.findall(r"\w+(?=[^\w,]*(?:,|$))", names), over.strip(" :{")  # its type is before a name
 
 
 def _numbers(over: str) -> tuple[int, str, bool] | None:
