@@ -30,6 +30,9 @@ _ADDED = r"(?m)\.extend\(|\)\s*\]\s*\*\s*\d|^\s*(\w+)[\[({]\d+[\])}]\s*=\s*\1[\[
 """Links that no call makes: of another list, ``[...] * 2``, ``L(2) = L(1)``."""
 
 
+_ADDED_THETA = r"(?s)\A(?!.*\b(?:offset|sigma)\b)(.*)\btheta(?=\s*=)"
+
+
 _OF_LOOP = ("is of a loop, or of another program", "Write a row for each joint")
 
 
@@ -47,6 +50,8 @@ def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
         order, toolbox = signatures(code).get(function, []), _TOOLBOX.fullmatch(function)
         of_lists = toolbox or function == "DH"
         texts = lists.written_out(each) if of_lists or order else [each.inside]
+        if function == "DHLink" and "OriginLink(" in code.text:  # ikpy's turns by its theta and the joint's angle
+            texts = [re.sub(_ADDED_THETA, r"\1offset", text) for text in texts]
         if of_lists and not texts:
             code.refuse(each.start, each.inside, *_OF_LOOP)
         made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
