@@ -177,7 +177,7 @@ def _arguments(function: str, text: str) -> Cells | None:
         return cells if is_row(cells) and not given else None
     order = [*filter(None, _ORDERS.get(low, "").split(","))]
     if len(given) == 1 and given[0].startswith("["):
-        order = words_of("alpha a theta d sigma") if function == "link" else _OF_LINK
+        order = [*words_of("alpha a theta d sigma")] if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
         if len(given) < 4:
             return None

@@ -590,6 +590,7 @@ MATLAB_FIELDS += "dh(2).a = 0.27; dh(2).alpha = 0; dh(2).d = 0; dh(2).offset = -
     [
         MATLAB_FIELDS,
         "L = [DHLink(α=-π/2, d=0.29, link_length=0, offset=0),\nDHLink(a=0.27, α=0, d=0, theta_offset=-π/2)]\n",
+        "L = [OriginLink(), DHLink(d=0.29, a=0, alpha=-π/2, theta=0),\nDHLink(d=0, a=0.27, alpha=0, theta=-π/2)]\n",
         '<arm><joint id="1" a="0" alpha="-90" d="290" offset="0"/>\n'
         '<joint id="2" a="270" alpha="0" d="0" offset="-90"/></arm>\n',
         "Joint 1: a=0, alpha=-90, d=290, offset=0\nJoint 2: a=270, alpha=0, d=0, offset=-90\n",
