@@ -17,6 +17,7 @@ from er3a.files.program_text import (
     filled,
     is_row,
     list_name,
+    pairs_of,
     record_of,
     row_cells,
     rows_of,
@@ -239,7 +240,12 @@ class Lists:
         lists = (each for each in named_lists(code) if each[1] and quantities_of(each[:1]) != joints)
         self.values: dict[str, Any] = {name: cells for name, cells, _, _ in lists}
         for group in code.groups:
-            if len(rows := rows_of(code, group)) > 1 and (name := list_name(group)) not in self.values:
+            name, texts = list_name(group), parts(group.inside)
+            own = group.bracket == "{" and group.before.rstrip().endswith("=")
+            if own and all(re.fullmatch(r"[\"']?\w+[\"']?\s*:[^\[{(:]+|", each) for each in texts):
+                changed = re.search(rf"\b{name}(?:\[[^\]\n]*\]\s*[-+*/]?=(?!=)|\.update\()", code.text)
+                self.values[name] = {} if changed or name in self.values else pairs_of(texts)
+            elif len(rows := rows_of(code, group)) > 1 and name not in self.values:
                 inner = [record_of(each) for each in code.groups if group.start < each.start < group.end]
                 self.values[name] = [each for each in inner if is_row(each)] or [row for _, row in rows]
 
@@ -268,7 +274,7 @@ class Lists:
     def _passes(self, text: str, names: Words, over: str) -> Iterator[Cells]:
         """What the names of a loop stand for in each pass; a row may be unpacked into the last ones. If an unknown name
         says how many passes there are, they go through all of the lists that a call takes."""
-        counts = {name: len(value) for name, value in self.values.items()}
+        counts = {name: len(value) for name, value in self.values.items() if isinstance(value, list)}
         numbers = _numbers(over)
         lists = [] if numbers else [name for name in re.findall(r"\w+", over) if name in counts]
         every = min([counts[name] for name in lists or re.findall(r"\w+", text) if name in counts], default=0)

@@ -65,7 +65,8 @@ _KIND_ELSEWHERE = re.compile(
 )
 """A joint that slides, said outside the table."""
 _LISTS = re.compile(
-    r"\b(\w*(?:offsets?|types?|sigma|signs?|directions?|dirs?|polarity|inv_joints?))\s*(?:\[\d*\])?\s*[:=]"
+    r"\b((?:\w*offsets?(?:_[a-z]\w*)?)|th(?:eta)?_?0|"
+    r"\w*(?:types?|sigma|signs?|directions?|dirs?|polarity|inv_joints?))\s*(?:\[\d*\])?\s*[:=]"
     r"\s*[\w.(]*[\[{]([^\[\]{}]*[1-9a-z][^\[\]{}]*)[\]}]",
     re.I,
 )
@@ -359,9 +360,9 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
     list of directions is asked back, as an offset may be added before or after."""
     (line, header), *rows = grid
     found = [(each[1], re.findall(r"[^,;\s\"']+", each[2])) for each in _LISTS.finditer(text)]
+    own = "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == ["offset"])
     for name, cells in [("type", _JOINTS.findall(text)), *found]:
         quantities, said = quantities_of(header), {each.lower() for each in cells}
-        own = "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == ["offset"])
         of_types, of_signs = (re.search(words, name, re.I) for words in ("type|sigma", "sign|dir|polar|inv"))
         if of_types:
             settled = "type" in header or not said <= _TYPES
@@ -369,8 +370,8 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
             settled = "direction" in header or not said & {"-1", "-1.0"} if of_signs else bool(own.strip("0."))
         if len(cells) != len(rows) or settled:
             continue
-        of_angles = name.lower().startswith(("th", "q", "joint", "angle"))
-        if of_signs or (not of_types and ("theta" in quantities or not of_angles or f"- {name}" in text)):
+        of_angles = re.match(r"(?i)(?:th|q|joint|angle).*offset", name) and f"- {name}" not in text
+        if of_signs or (not of_types and ({"theta", "offset"} & {*quantities} or not of_angles)):
             what = "directions" if of_signs else "offsets"
             raise InputError(
                 path,
@@ -378,7 +379,8 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
                 f"'{name}' may be {what} of the table's joints, and no column holds them",
                 "Add a column direction, or add offsets to theta, or remove that line",
             )
-        header = [*header, "type" if of_types else "offset"]
+        unit = re.search(r"_(?:deg|rad)$", name.lower())
+        header = [*header, "type" if of_types else f"offset{unit[0] if unit else ''}"]
         rows = [(number, [*row, cell]) for (number, row), cell in zip(rows, cells)]
     return [(line, header), *rows]
 

@@ -6,7 +6,7 @@ import re
 
 from er3a.files.code_brackets import CodeGroup
 from er3a.files.code_links import links_of, listed_rows
-from er3a.files.code_lists import columns_of, named_lists, numbered_lists
+from er3a.files.code_lists import Lists, columns_of, named_lists, numbered_lists
 from er3a.files.column_order import names_columns, order_of, program
 from er3a.files.program_text import Code, list_name, row_cells, rows_of
 from er3a.files.table_cells import Grid, Words
@@ -27,7 +27,8 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     code = program(text)
     matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), _listed(code)) if grid]
     if not headed:
-        return [[(line, row) for line, row in grid if line] for grid in matrices]
+        lists, unnamed = Lists(code), [""] * MOST_COLUMNS
+        return [[(line, _shown(lists, unnamed, row)) for line, row in grid if line] for grid in matrices]
     links, others, lists = links_of(code)
     links = links or listed_rows(code)
     named = [grid for grid in matrices if grid[0][1]]
@@ -38,12 +39,21 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
             _check_kept(code, group, bool(named or lists.taken), lists.taken)
     if found and not (links and "type" in links[0][0][1]) and (moved := re.search(_TURNED, code.text)):
         code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
+    return [[(line, _shown(lists, table[0][1], row)) for line, row in table] for table in found]
 
-    def shown(name: str, cell: str) -> str:
-        kept = place_of(name) == "theta" or ("[" in cell and not lists.said)
-        return cell if kept else lists.resolved(cell)
 
-    return [[(line, [*map(shown, table[0][1], row)]) for line, row in table] for table in found]
+MOST_COLUMNS = 8
+"""Of a matrix that is a table of links."""
+
+
+def _shown(lists: Lists, header: Words, row: Words) -> Words:
+    """A row with elements of lists in place of their names; in a language that nothing says, numbers of elements may be
+    from 0 or 1."""
+    kept = [
+        place_of(name) == "theta" or bool(re.search(r"\[\d", cell) and not lists.said)
+        for name, cell in zip(header, row)
+    ]
+    return [cell if keep else lists.resolved(cell) for keep, cell in zip(kept, row)]
 
 
 _CONSTANT = {"a", "alpha", "d", "offset"}
@@ -115,7 +125,7 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
     several = len({line for line, _ in rows}) == len(rows)
     labels = [code.comments.get(line, "") if several else "" for line, _ in rows]
     widths = {len(cells) for _, cells in rows}
-    return _titled(code, rows, labels, group.before) if len(widths) == 1 and 3 <= min(widths) <= 8 else []
+    return _titled(code, rows, labels, group.before) if len(widths) == 1 and 3 <= min(widths) <= MOST_COLUMNS else []
 
 
 def _listed(code: Code) -> Grid:
@@ -124,17 +134,17 @@ def _listed(code: Code) -> Grid:
     stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
     for group in code.groups:
         label = re.search(
-            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|"
+            r"(?:^|[\n{,])\s*(?:-|[\"']?(\w+)[\"']?\s*:|"
             r"(?:(?:(?:static|const|constexpr|double|float)\s+)*(\w+\d)(?:\[[4-8]\])?|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)"
             r"\s*$|setFixedTransform\([^\n]*,\s*$",
             group.before,
         )
         if label and label[2] and label[2] not in stacked and "dh" not in label[2].lower():
             continue
-        if label and not re.search(r"[\[{:]", group.inside):
+        if label and not re.search(r"(?<!\w)\[|[{:]", group.inside):
             cells = row_cells(group.inside)
-            alike = len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= 8
-            if alike and all(re.search(r"\d|pi|π", cell) for cell in cells):
+            numeric = sum(bool(re.search(r"\d|pi|π", cell)) for cell in cells)
+            if len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= min(2 * numeric, MOST_COLUMNS):
                 rows.append((code.line(group.start), cells))
                 labels.append(label[1] or label[2] or "")
                 arms.add((label[2] or "").rstrip("0123456789"))

@@ -287,6 +287,8 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i,α,d,θ,r\n1,90,270,θ1,300\n2,0,200,θ2,0\n", "--column"),  # Khalil's d is a
         ("i,a,alpha,d,theta\n1,a1,90,300,q1\n2,270,0,0,q2\n", "a1 = "),
         ("L(1) = Link([0.5 0.3 0 pi/2]);\nL(2) = Link([0 0 0.3 0]);", "offsets"),
+        ("# d, a, alpha\nrows = [[0.3, 0, -pi/2],\n        [0, 0.3, 0]]\noffsets_left = [0, pi/2]", "offsets_left"),
+        ("# d, a, alpha\nrows = [[0.3, 0, -pi/2],\n        [0, 0.3, 0]]\ntheta0 = [0, pi/2]", "theta0"),
         ("L = [Link([0 0.3 0 pi/2])];\nL(2).offset = 1;\nL(3).offset = 2;", "call"),
         ("L(1) = Link([0 0.1 0 pi/2]);\nL(2) = Link(dh(2,:));", "line 2"),
         ("for i in range(3):\n  links.append(RevoluteDH(d=0.1, a=0.2))", "row for each"),
@@ -460,10 +462,19 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "**Note:** `β = 90°`.",
         "L(1)=Link([0 0.29 0 -pi/2]);\nL(2)=Link([0 0 0.27 0]);\nr = SerialLink(L);\nr.offset(2)=-pi/2;",
         "L(1)=Link([0 0.29 0 -pi/2]);\nL(2)=Link([0 0 0.27 0]);\nr = SerialLink(L);\nr.links(2).offset=-pi/2;",
+        "# d, a, alpha\nROWS = [[0.29, 0, -pi/2],\n        [0, 0.27, 0]]\nTHETA_OFFSETS_LEFT = [0, -pi/2]",
     ],
 )
 def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
     content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+@pytest.mark.parametrize(("brace", "a2"), [("", "0.27"), ("\n", "lengths['upper']"), ("", "self.lengths['upper']")])
+def test_no_row_of_named_rows_is_left_out(tmp_path, brace, a2):
+    given = "import math\nself.lengths = {'base': 0.29, 'upper': 0.27}\nL = [0.29, 0.27]\n"
+    rows = f"arm = {{{brace}'s': [L[0], 0, 0, -90],\n 'e': [0, -90, {a2}, 0]}}"
+    content, _ = read(tmp_path, given + rows, columns=["d", "offset", "a", "alpha"])
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
 
 
