@@ -295,11 +295,11 @@ def _assumed(given: set[str], kinds: set[str], convention: Convention) -> Iterat
     if not given & {"offset_deg", "direction"}:
         yield "no column offset_deg or direction: joint angles are taken to be the table's own"
     if "deg" in kinds and "lower_deg" not in given:
-        yield f"no limits in the table: +-{ASSUMED_LIMIT_DEG:g} deg were assumed for all joints that turn"
+        yield f"no limits were read: +-{ASSUMED_LIMIT_DEG:g} deg were assumed for all joints that turn"
     if "mm" in kinds and "lower_mm" not in given:
-        yield f"no limits in the table: 0 to {ASSUMED_SLIDE_MM:g} mm were assumed for all joints that slide"
+        yield f"no limits were read: 0 to {ASSUMED_SLIDE_MM:g} mm were assumed for all joints that slide"
     if any(f"speed_{unit}_s" not in given for unit in kinds):
-        yield "no speeds in the table: those that the study assumes stand in for them"
+        yield "no speeds were read: those that the study assumes stand in for them"
 
 
 def _unit_of(column: str) -> str:

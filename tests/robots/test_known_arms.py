@@ -109,6 +109,7 @@ def test_a_far_table_is_not_named(tmp_path):
     found = said(written(tmp_path / "table.csv", [*rows, (0, 0, 72, 0, 1)], "standard"))
     assert found["arm"] is None
     assert found["nearest"]
+    assert found["notes"]  # what was assumed in reading it
     assert min(each["different_entries"] for each in found["nearest"]) > 1
 
 

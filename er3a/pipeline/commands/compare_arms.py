@@ -198,9 +198,12 @@ def identify(source: str, asked: CompareRequest) -> None:
     ranked = best_of(robot, {name: robots[name] for name in likely(robot, robots)}, **tolerances)
     near = ranked and ranked[0][1].different_entries <= NEAR
     if not near or (ranked[0][1].geometry and ranked[0][1].geometry.unexplained_mm):
+        notes = _notes((source, read[0]))
+        for note in notes:
+            print_note(note)
         if asked.as_json:
             nearest = [{"arm": each, "different_entries": found.different_entries} for each, found in ranked]
-            print_json({"arm": None, "nearest": nearest})
+            print_json({"arm": None, "nearest": nearest, "notes": notes})
         else:
             print("\n".join(not_near_lines([(known[each], found) for each, found in ranked[:NEAREST_SHOWN]])))
         raise typer.Exit(1)
@@ -287,12 +290,12 @@ def _beside(found: Comparison, first: ReadArm, other: ReadArm) -> Comparison:
     return replace(found, not_examined=(*ranges, *given_by_both(first.beside, other.beside)))
 
 
-def _notes(one: tuple[str, ReadArm], other: tuple[str, ReadArm]) -> list[str]:
-    """What was assumed in reading two arms, by their names, and that their tools differ."""
+def _notes(*arms: tuple[str, ReadArm]) -> list[str]:
+    """What was assumed in reading arms, by their names, and that the tools of two differ."""
     import numpy as np
 
-    notes = [f"{source}: {note}" for source, read in (one, other) for note in read.notes]
-    (a, first), (b, second) = one, other
+    notes = [f"{source}: {note}" for source, read in arms for note in read.notes]
+    (a, first), (b, second) = arms[0], arms[-1]
     if not np.allclose(first.robot.tool, second.robot.tool, rtol=0.0, atol=TOOLS_EQUAL):
         apart = 1000 * float(np.linalg.norm(first.robot.tool[:3, 3] - second.robot.tool[:3, 3]))
         notes.append(f"{a} and {b}: tools are not compared; these differ (their points by {apart:.3g} mm)")
