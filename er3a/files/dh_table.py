@@ -77,7 +77,8 @@ def read_dh_table(
     Parameters
     ----------
     name : of the robot
-    convention : None means standard, unless the table says another, or its numbers are a known arm's in the other alone
+    convention : None means standard, unless the table says another, its numbers are a known arm's in the other alone,
+        or joints 1 and 2 would turn about one line
     length_unit, angle_unit : units of a table whose column names say mm and deg although its values are in other units;
         None means mm and deg, unless the values can't be
     as_printed : keep values in the unit that their column says although they look like another; each gives a
@@ -135,13 +136,17 @@ def read_dh_table(
     if short or 0 < longest < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
     found = parse(RobotFile, content, path, AS_PRINTED if as_printed else None)
-    way = said or _known_as(found)
+    way, near = (said, "") if said else _known_as(found)
+    why = "so it is a known arm's, as standard D-H none's"
+    if way is None and idle:
+        # A table whose axes are all parallel has no joint that says which link its lengths are of.
+        if near == "standard" or not rows[1]["alpha_deg"]:
+            raise _two_readings(path)
+        way, why = "modified", "as standard D-H, joints 1 and 2 would turn about one line"
     if way == "modified" and not said:
         form: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "as_printed": as_printed, "text": text}
         other, assumed = read_dh_table(path, name, way, columns=columns, **form)
-        return other, (*assumed, "read as modified D-H: so it is a known arm's, as standard D-H none's")
-    if way is None and idle:
-        raise _two_readings(path)
+        return other, (*assumed, f"read as modified D-H: {why}")
     return found, tuple(notes)
 
 
@@ -149,7 +154,7 @@ def _first_is_idle(rows: Sequence[CsvRow]) -> bool:
     """Whether the first row alone has neither a nor alpha, as is usual in Craig's tables; read as standard, two joints
     would do one's work."""
     still = [not (row["a_mm"] or row["alpha_deg"]) for row in rows if row.get("type") not in FIXED]
-    return sum(still) == 1 and still[0] and len(still) > 1 and _unit(rows[1]) == "deg"
+    return sum(still) == 1 and still[0] and len(still) > 1 and {*map(_unit, rows[:2])} == {"deg"}
 
 
 def _two_readings(path: Path) -> InputError:
@@ -158,9 +163,9 @@ def _two_readings(path: Path) -> InputError:
     return InputError(path, "convention", problem, remedy)
 
 
-def _known_as(content: RobotFile) -> Convention | None:
-    """The convention in which alone a table's numbers are those of an arm of the catalogue, but for one; None if they
-    are in neither."""
+def _known_as(content: RobotFile) -> tuple[Convention | None, str]:
+    """The convention in which alone a table's numbers are those of an arm of the catalogue, but for one, None if they
+    are in neither or both; and the one in which they are nearer, "" if in none."""
     from er3a.comparison.nearest import misfits  # most tables say their convention
     from er3a.files.arm_catalogue import known_arms
 
@@ -175,8 +180,9 @@ def _known_as(content: RobotFile) -> Convention | None:
         )
     arms = [each.robot for each in known_arms().values() if np.array_equal(each.robot.sliding, robot.sliding)]
     off = misfits(robot, arms).min(axis=1).tolist() if arms else [np.inf]
-    clear = min(off) < ONE_ENTRY and max(off) > min(off) + OTHERWISE
-    return CONVENTIONS[off.index(min(off))] if clear else None
+    nearer = CONVENTIONS[off.index(min(off))]
+    near, clear = min(off) < ONE_ENTRY, max(off) > min(off) + OTHERWISE
+    return nearer if near and clear else None, nearer if near else ""
 
 
 def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -> PrintedTable:

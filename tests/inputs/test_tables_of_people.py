@@ -980,16 +980,17 @@ def test_names_and_places_that_programs_give_a_table_are_read(tmp_path, text):
 CRAIG = "joint,a,alpha,d,theta\n1,0,0,333,q1\n2,0,-90,0,q2\n3,82,90,316,q3\n4,-82,90,0,q4\n"
 
 
-def test_a_convention_by_which_two_joints_turn_about_one_line_is_asked_back(tmp_path):
-    path = tmp_path / "arm.csv"
-    path.write_text(CRAIG)
-    for as_printed in (False, True):
-        with pytest.raises(InputError, match="joints 1 and 2 turn about one line"):
-            read_dh_table(path, "arm", as_printed=as_printed)
+def test_of_two_conventions_that_is_read_in_which_no_joints_turn_about_one_line(tmp_path):
+    content, notes = read(tmp_path, CRAIG)
+    assert content.dh.convention == "modified"
+    assert "joints 1 and 2" in notes[-1]
+    path = tmp_path / "table.txt"
     assert read_dh_table(path, "arm", "standard")[0].dh.convention == "standard"  # said, so it is meant
     assert read(tmp_path, "Modified DH\n" + CRAIG)[0].dh.convention == "modified"
     # As modified rows joints 3 and 4 would turn about one line, too: nothing to choose between.
     assert read(tmp_path, CRAIG.replace("4,-82,90", "4,0,0"))[0].dh.convention == "standard"
+    with pytest.raises(InputError, match="joints 1 and 2 turn about one line"):  # all axes are parallel
+        read(tmp_path, "joint,a,alpha,d,theta\n1,0,0,333,q1\n2,250,0,0,q2\n3,210,0,0,q3\n")
 
 
 @pytest.mark.parametrize("modified", [False, True])
