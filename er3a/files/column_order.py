@@ -51,6 +51,7 @@ def order_of(code: Code, rows: Grid, before: str) -> Words:
             *_UNPACKED.findall(code.text),
             *_ENUM.findall(code.text),
             *_LISTED.findall(code.text),
+            ",".join(re.findall(r"<th\b[^>]*>([^<]+)</th>", code.text)),  # above rows that a script writes
             *_indexed(code),
         ],
         width,

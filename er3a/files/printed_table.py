@@ -58,6 +58,8 @@ _KINDS = words_of(
     "r=revolute 0=revolute rot=revolute rotational=revolute rotary=revolute 旋转=revolute "
     "p=prismatic 1=prismatic linear=prismatic 移动=prismatic"
 )
+_KIND_SAID = re.compile(r"(revolute|prismatic)\W?\s*[:=]\s*([0-9])\b|\b([0-9])\s*[:=]\s*(revolute|prismatic)")
+"""What a number of a type is, as a comment or an enumeration says it."""
 _KIND_ELSEWHERE = re.compile(
     r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?\w*[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b|"
     r"(?:types?|sigma)\s*=\s*[\[{(][^\n]*(?:prismatic|\b1\b)|[%#/][^\n]*(?:\bprismatic\b|平动|移动关节))",
@@ -251,7 +253,7 @@ def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
         if found and kind == "lines":
             break
         try:
-            tables = [_with_names(table) for grid in read() for table in _headed(grid, columns)]
+            tables = [_with_names(_first_columns(table)) for grid in read() for table in _headed(grid, columns)]
             found += [(tables, kind == "program")] if tables else []
         except InputError:
             if not found:
@@ -327,6 +329,17 @@ def _with_names(table: Grid) -> Grid:
     firsts = [cells[0] for _, cells in rows if len(cells) == len(header) + 1]
     named = len(firsts) == len(rows) and all(map(_NAMED.fullmatch, firsts))
     return [(line, ["joint", *header]), *rows] if named else table
+
+
+def _first_columns(table: Grid) -> Grid:
+    """A table without further columns whose headings are not as many as their cells, as on pages of Universal Robots:
+    all of its own cells hold numbers, and a word follows them."""
+    (line, header), *rows = table
+    width = 1 + max((k for k, name in enumerate(header) if quantities_of([name])), default=-1)
+    others = [cells for _, cells in rows if len(cells) != len(header)]
+    cut = [cells for cells in others if len(cells) > width and all(re.search(r"\d|π", cell) for cell in cells[1:width])]
+    ended = [cells for cells in cut if re.fullmatch(r"[^\W\d]+", cells[width])]
+    return [(number, cells[:width]) for number, cells in table] if rows and len(ended) == len(rows) else table
 
 
 def _stacked(text: str) -> list[Grid]:
@@ -418,7 +431,7 @@ class _Table:
             self.notes.append("base and tool of the program are not read")
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.lengths = self._said_unit(text)
-        self.kinds = self._kinds()
+        self.kinds = self._kinds(text)
         self._offset_slides()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             raise InputError(path, "types of joints", f"'{kind[0]}' is no column of the table", "Add a column of types")
@@ -592,15 +605,16 @@ class _Table:
             self._refuse(row, k, f"'{cell}' is not a number", "Write a number")
         return replace(found, variables=names)
 
-    def _kinds(self) -> Words:
+    def _kinds(self, text: str) -> Words:
         """The type of each row: its d slides if that is a variable, and theta none; nothing moves in a row that has no
         variable although others have one, or at an end if it alone has no number in its name."""
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
         if k is not None:
             types = [cells[k].strip().lower() for _, cells in self.rows]
-            if {*types} == {"1"}:
+            said = {number or other: kind or word for kind, number, other, word in _KIND_SAID.findall(text.lower())}
+            if {*types} == {"1"} and "1" not in said:
                 self._refuse(None, k, "1 may be a joint that turns or one that slides", "Write revolute or prismatic")
-            return [_KINDS.get(each, each) for each in types]
+            return [said.get(each, _KINDS.get(each, each)) for each in types]
         turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
         blank = [each is None for each in self._of("theta")]  # which says nothing of what moves
         starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]

@@ -21,7 +21,7 @@ MARKS = "|", "│", "┃", "║", "\t", ";", ",", "  ", " "
 _BOX = re.compile(r"[─━═│┃║┌┐└┘├┤┬┴┼╔╗╚╝╠╣╦╩╬╒╕╘╛╞╡╤╧╪╭╮╰╯┏┓┗┛┣┫┳┻╋━+|:=\s_-]*")
 _UNIT = r"(?:mm|cm|m|in|inch|deg\w*|grad|rad\w*|°|毫米|米|度)"
 _LATEX = (
-    (r"(?<!\\)%.*", ""),
+    (r"(?<!\\)%.*|&(?=\s*=)|(?m:\\\\[ \t]*$)", ""),  # aligned equations give values
     (r"\\(?:hline|toprule|midrule|bottomrule|hhline\{[^}]*\})|\\(?:cline|cmidrule)(?:\([lr]+\))?\{[^}]*\}", ""),
     (
         r"\\multirow\s*\{[^}]*\}\s*(?:\[[^\]]*\])?\{[^}]*\}|\\(?:left|right|displaystyle|limits|boldmath|bfseries|bf|rm|it)\b",

@@ -288,6 +288,10 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i,a,alpha,d,theta\n1,a1,90,300,q1\n2,270,0,0,q2\n", "a1 = "),
         ("L(1) = Link([0.5 0.3 0 pi/2]);\nL(2) = Link([0 0 0.3 0]);", "offsets"),
         ("# d, a, alpha\nrows = [[0.3, 0, -pi/2],\n        [0, 0.3, 0]]\noffsets_left = [0, pi/2]", "offsets_left"),
+        (
+            "Name theta [rad] a [m] d [m] alpha [rad] Mass [kg]\nJoint 1 0 0 0.1 0 2.5\nJoint 2 0 0.4 0 0 3.5 1\n",
+            "fields",
+        ),
         ("# d, a, alpha\nrows = [[0.3, 0, -pi/2],\n        [0, 0.3, 0]]\ntheta0 = [0, pi/2]", "theta0"),
         ("L = [Link([0 0.3 0 pi/2])];\nL(2).offset = 1;\nL(3).offset = 2;", "call"),
         ("L(1) = Link([0 0.1 0 pi/2]);\nL(2) = Link(dh(2,:));", "line 2"),
@@ -414,6 +418,15 @@ def test_centimetres_that_the_text_says_are_no_millimetres(tmp_path, said, longe
     assert content.dh.rows[1].a_mm == pytest.approx(longest)
 
 
+def test_aligned_equations_of_a_document_give_values(tmp_path):
+    table = r"""\begin{tabular}{cccc} $a$ & $\alpha$ & $d$ & $\theta$ \\ 0 & -90 & $L_1$ & $q_1$ \\ $L_2$ & 0 & 0 &
+$q_2-90$ \end{tabular} \begin{align*}
+L_1 &= 290 \,\mathrm{mm} \\
+L_2 &= 270 \,\mathrm{mm}
+\end{align*}"""
+    np.testing.assert_allclose(numbers(read(tmp_path, table)[0]), IRB120[:2], atol=1e-9)
+
+
 def test_names_given_by_each_other_end():
     with pytest.raises(ValueError, match="deep"):
         amount_of("a", {"a": "b", "b": "a"})
@@ -462,6 +475,13 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "**Note:** `β = 90°`.",
         "L(1)=Link([0 0.29 0 -pi/2]);\nL(2)=Link([0 0 0.27 0]);\nr = SerialLink(L);\nr.offset(2)=-pi/2;",
         "L(1)=Link([0 0.29 0 -pi/2]);\nL(2)=Link([0 0 0.27 0]);\nr = SerialLink(L);\nr.links(2).offset=-pi/2;",
+        "T = [(-pi/2, 0, d1, th1), (0, L2, 0, th2-pi/2)]\nd1 = 0.29\nL2 = 0.27",
+        "<tr><th>i</th><th>θ</th><th>d</th><th>a</th><th>α</th></tr>\n{[[1, 'θ₁', 290, 0, -90],\n"
+        "  [2, 'θ₂-90', 0, 270, 0]].map((row) => (<td>{row}</td>))}",
+        "Kinematics theta [rad] a [m] d [m] alpha [rad] Dynamics Mass [kg] Center of Mass [m]\n"
+        "Joint 1 0 0 0.29 -π/2 Link 1 3.7 [0, -0.02, 0.001]\nJoint 2 -π/2 0.27 0 0 Link 2 8.1 [0.2, 0, 0.1]\n",
+        "# revolute: 1, prismatic: 2\ndh = [{'alpha': -pi/2, 'a': 0, 'd': 0.29, 'theta': 0, 'type': 1},\n"
+        "      {'alpha': 0, 'a': 0.27, 'd': 0, 'theta': -pi/2, 'type': 1}]",
         "# d, a, alpha\nROWS = [[0.29, 0, -pi/2],\n        [0, 0.27, 0]]\nTHETA_OFFSETS_LEFT = [0, -pi/2]",
     ],
 )
