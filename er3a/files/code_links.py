@@ -54,6 +54,8 @@ def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
             texts = [re.sub(_ADDED_THETA, r"\1offset", text) for text in texts]
         if of_lists and not texts:
             code.refuse(each.start, each.inside, *_OF_LOOP)
+        if target and re.search(rf"\b{re.escape(target)}\(1\)\s*=\s*{function}\(", code.text):
+            continue  # what elements are like, of which the first comes then
         made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
         made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells))]
         target = _target(each, target or "", bool(toolbox) and len(texts) == 1)
@@ -165,7 +167,7 @@ def _arguments(function: str, text: str) -> Cells | None:
     """A row's cells by their headings; None if the call makes no link."""
     low = function.lower()
     given, words, cells = Words(), Words(), Cells()
-    for part in parts(_NAMED_BEFORE.sub(r"\1=", text)):
+    for part in parts(_NAMED_BEFORE.sub(r"\1=\2", text)):
         key, is_named, value = part.partition("=")
         if is_named and re.fullmatch(r"\w+\s*", key):
             cells[_argument(key)] = value.strip(" \"'")
@@ -173,6 +175,8 @@ def _arguments(function: str, text: str) -> Cells | None:
             words.append(word.lower())
         elif part:
             given.append(part)
+    if {"theta", "dz", "dx", "alpha"} <= {*cells}:  # Kajita's lengths along z and x, as textbooks have them
+        cells["d"], cells["a"] = cells.pop("dz"), cells.pop("dx")
     if not _TOOLBOX.fullmatch(function):
         return cells if is_row(cells) and not given else None
     order = [*filter(None, _ORDERS.get(low, "").split(","))]
@@ -194,7 +198,7 @@ def _argument(key: str) -> str:
 
 
 _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
-_NAMED_BEFORE = re.compile(rf"""["'](?!(?:{_FLAGS.pattern})["'])(\w*)["']\s*,\s*(?=\S)""", re.I)
+_NAMED_BEFORE = re.compile(rf"""["'](?!(?:{_FLAGS.pattern})["'])(\w*)["']\s*,\s*(["'][^"']*["']|(?=\S))""", re.I)
 """A name of MATLAB's before its value."""
 
 

@@ -139,7 +139,7 @@ _OF_VECTORS = words_of("a alpha d theta offset type direction pose")
 _NUMBERED = re.compile(
     r"""
     (?<![\w."'])(?P<quote>["'])?(?:DH_)?
-    (?P<name>al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)
+    (?P<name>al(?:(?:p|ph|f)a?)?|theta|th|aa?|r|dd?|q|(?:(?:theta|q)_)?offset)
     (?P<bracket>[_({\[]*)(?P<number>\d{1,2})[)}\]]*(?(quote)(?P=quote))   # a1, "a1", a_{1}, a(1)
     \s*(?P<mark>[:=])(?!=)\s*
     (?!(?:\w+\.)?symbols?\()                                             # a symbol of SymPy is no value
@@ -150,11 +150,21 @@ _NUMBERED = re.compile(
 """An entry of a table that has a name with a number, and its value."""
 
 
+def _each_of_range(found: re.Match[str]) -> str:
+    """A statement for each entry that ``a(1:6) = 0;`` gives a value, and no other one."""
+    of_range = range(int(found[2]), int(found[3]) + 1)
+    rest = [k for k in of_range if not re.search(rf"\b{found[1]}\({k}\)\s*=", found.string)]
+    return ";".join(f"{found[1]}({k}) = {found[4]}" for k in rest)
+
+
 def numbered_lists(code: Code) -> Iterator[NamedList]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
     spellings: dict[str, dict[str, dict[int, tuple[str, str, int]]]] = {}  # value, mark and place of each number
     text = re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text)
+    text = re.sub(r"(\w+)\((\d\d?):(\d\d?)\)\s*=\s*([-\d.]+)(?=\s*[;\n])", _each_of_range, text)
+    fields = re.findall(r"(?m)^\s*(\w+\.)(?:a|d|alpha|theta|offset)\(\d+\)\s*=", text)
+    text = text.replace(fields[0], "") if len({*fields}) == 1 else text  # of one record: dh.alpha(1) = pi
     for each in _NUMBERED.finditer(text):
         _, name, bracket, number, mark, value = each.groups()
         for spelling in (f"{bracket}{name.isupper()}", "~"):  # D1 = 0.3; d(1) = D1

@@ -482,6 +482,13 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "Joint 1 0 0 0.29 -π/2 Link 1 3.7 [0, -0.02, 0.001]\nJoint 2 -π/2 0.27 0 0 Link 2 8.1 [0.2, 0, 0.1]\n",
         "# revolute: 1, prismatic: 2\ndh = [{'alpha': -pi/2, 'a': 0, 'd': 0.29, 'theta': 0, 'type': 1},\n"
         "      {'alpha': 0, 'a': 0.27, 'd': 0, 'theta': -pi/2, 'type': 1}]",
+        "L = struct('name', 'Body', 'th', 0, 'dz', 0, 'dx', 0, 'alf', 0, 'az', UZ);\n"
+        "L(1) = struct('name', 'Base', 'th', 0, 'dz', 0, 'dx', 0, 'alf', 0, 'az', UZ);\n"
+        "L(2) = struct('name', 'J1', 'th', 0, 'dz', 290, 'dx', 0, 'alf', -pi/2, 'az', UZ);\n"
+        "L(3) = struct('name', 'J2', 'th', -pi/2, 'dz', 0, 'dx', 270, 'alf', 0, 'az', UZ);",
+        "arm.alpha(1) = -pi/2;\narm.alpha(2) = 0;\narm.a(1:2) = 0;\narm.a(2) = 270;\narm.d(1) = 290;\narm.d(2) = 0;\n"
+        "arm.offset(1) = 0;\narm.offset(2) = -pi/2;",
+        "dd1 = 290; dd2 = 0; aa1 = 0; aa2 = 270; al1 = -90; al2 = 0; offset1 = 0; offset2 = -90;",
         "# d, a, alpha\nROWS = [[0.29, 0, -pi/2],\n        [0, 0.27, 0]]\nTHETA_OFFSETS_LEFT = [0, -pi/2]",
     ],
 )
