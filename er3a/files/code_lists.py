@@ -104,6 +104,11 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
             "Name it offset if theta = q + offset, or remove it",
         )
     titles, lengths, places, _ = zip(*columns.values())
+    short = min(map(len, lengths))
+    ends = [
+        title.endswith("(i-1)") and " ".join(cells[short:]) in ("0", "0.0") for title, cells in zip(titles, lengths)
+    ]
+    lengths = tuple(cells[:short] if end else cells for end, cells in zip(ends, lengths))  # a6 = 0 of the flange
     entries = dict(zip(columns, map(len, lengths)))
     used = {*re.findall(r"(?<![\w.])(?:q|thetas?|joints|joint_angles)[\[(](\d+)[\])]", program)}
     # q[0] to q[6] with eight rows: one of these is fixed

@@ -25,7 +25,7 @@ from er3a.files.column_order import LIBRARIES, program
 from er3a.files.csv_file import Lines
 from er3a.files.program_text import Cells, Code
 from er3a.files.table_cells import MARKS, Grid, Words, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import code_grids
+from er3a.files.table_code import COUPLED, code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -429,6 +429,8 @@ class _Table:
         self.convention = self._stated(program(text) if from_code else None, text)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
+        if from_code and (coupled := COUPLED.search(self.text)):
+            self.notes.append(f"'{coupled[0]}' is not read: joints are taken to turn by themselves")
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.lengths = self._said_unit(text)
         self.kinds = self._kinds(text)

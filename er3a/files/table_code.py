@@ -37,8 +37,10 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     if found and (lists.taken or not links):
         for group in code.groups:
             _check_kept(code, group, bool(named or lists.taken), lists.taken)
-    if found and not (links and "type" in links[0][0][1]) and (moved := re.search(_TURNED, code.text)):
-        code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
+    of_types = links and "type" in links[0][0][1]
+    for moved in re.finditer(_TURNED, code.text) if found and not of_types else ():
+        if not COUPLED.fullmatch(moved[0].strip(" ;\n")):
+            code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
     return [[(line, _shown(lists, table[0][1], row)) for line, row in table] for table in found]
 
 
@@ -109,6 +111,10 @@ _TURNED = (
     r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*)?[-+].*(?:pi|\d).*|"
     r"^\s*((?:q|th|theta)\w*)\s*=\s*(?:\1|(?:q|th|theta)[a-z_]*)\s*[-+].*(?:pi\b|90|180).*"
 )
+
+
+COUPLED = re.compile(r"((?:q|th|theta)\w*[\[(]\d[\])])\s*=\s*\1\s*[-+]\s*(?:q|th|theta)\w*[\[(]\d[\])]")
+"""Of a joint that turns with another one, as parallel links make it."""
 
 
 _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)

@@ -418,6 +418,18 @@ def test_centimetres_that_the_text_says_are_no_millimetres(tmp_path, said, longe
     assert content.dh.rows[1].a_mm == pytest.approx(longest)
 
 
+def test_a_flange_of_zeros_and_a_coupling_are_no_rows(tmp_path):
+    text = "alpha0 = 0; a0 = 0; d1 = 290; offset1 = 0;\nalpha1 = -90; a1 = 50; d2 = 0; offset2 = -90;\n"
+    content, _ = read(tmp_path, f"{text}alpha2 = 0; a2 = 0;\n")
+    assert numbers(content) == [(0, 0, 290, 0), (50, -90, 0, -90)]
+    lists = "a = [0, 0.27];\nalpha = [-pi/2, 0];\nd = [0.29, 0];\noffset = [0, -pi/2];\n"
+    content, notes = read(tmp_path, f"{lists}q(2) = q(2) - q(1);\n")
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+    assert any("q(2) = q(2) - q(1)" in note for note in notes)
+    with pytest.raises(InputError, match="different numbers"):
+        read(tmp_path, f"{text}alpha2 = 0; a2 = 40;\n")
+
+
 def test_aligned_equations_of_a_document_give_values(tmp_path):
     table = r"""\begin{tabular}{cccc} $a$ & $\alpha$ & $d$ & $\theta$ \\ 0 & -90 & $L_1$ & $q_1$ \\ $L_2$ & 0 & 0 &
 $q_2-90$ \end{tabular} \begin{align*}
@@ -489,6 +501,7 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "arm.alpha(1) = -pi/2;\narm.alpha(2) = 0;\narm.a(1:2) = 0;\narm.a(2) = 270;\narm.d(1) = 290;\narm.d(2) = 0;\n"
         "arm.offset(1) = 0;\narm.offset(2) = -pi/2;",
         "dd1 = 290; dd2 = 0; aa1 = 0; aa2 = 270; al1 = -90; al2 = 0; offset1 = 0; offset2 = -90;",
+        "alpha1 = -pi/2; a1 = 0; d1 = 290*mm2m; offset1 = 0\nalpha2 = 0; a2 = 270*mm2m; d2 = 0; offset2 = -pi/2",
         "# d, a, alpha\nROWS = [[0.29, 0, -pi/2],\n        [0, 0.27, 0]]\nTHETA_OFFSETS_LEFT = [0, -pi/2]",
     ],
 )
