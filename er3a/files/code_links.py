@@ -54,10 +54,8 @@ def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
             texts = [re.sub(_ADDED_THETA, r"\1offset", text) for text in texts]
         if of_lists and not texts:
             code.refuse(each.start, each.inside, *_OF_LOOP)
-        if target and re.search(rf"\b{re.escape(target)}\(1\)\s*=\s*{function}\(", code.text):
-            continue  # what elements are like, of which the first comes then
         made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
-        made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells))]
+        made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells, target))]
         target = _target(each, target or "", bool(toolbox) and len(texts) == 1)
         for k, cells in enumerate(made):
             name = f"{target}.{k}" if target and len(made) > 1 else target
@@ -126,9 +124,11 @@ def _of_signature(order: Words, text: str) -> Cells:
     return {} if len(cells) < len(order) or parameters_of(text) == order else cells
 
 
-def _says_numbers(code: Code, cells: Cells) -> bool:
-    """Whether a row holds numbers or names of numbers, and no elements of lists."""
+def _says_numbers(code: Code, cells: Cells, target: str | None) -> bool:
+    """Whether a row holds numbers or names of numbers, and no elements of lists; no model of elements ``L(1)``, ..."""
     texts = _constants(cells)
+    if target and f"{target}(1)" in code.text:
+        return False
     return not any(re.search(r"\[(?!\d+\])|\w(?<!2)\(\w+\s*,\s*\w+\)|\bc\(", cell) for cell in texts) and any(
         not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(rf"(?m)^\s*{re.escape(cell)}\s*=[^\[{{\n]+$", code.text)
         for cell in texts

@@ -197,7 +197,10 @@ def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -
     found = printed_table(path, text, columns)
     if found is None and path.suffix != ".csv":
         problem = nearest_headings(text) or "no row of headings with a, alpha and d was found"
-        raise InputError(path, None, problem, "Name the columns, or say what they are: --column theta,d,a,alpha")
+        remedy = (
+            "Write all numbers of a row, 0 too, below a line theta,d,a,alpha, or say what its columns are: --column"
+        )
+        raise InputError(path, None, problem, remedy)
     return found or PrintedTable(read_lines(path), ())
 
 

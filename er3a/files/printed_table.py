@@ -334,12 +334,11 @@ def _with_names(table: Grid) -> Grid:
 def _first_columns(table: Grid) -> Grid:
     """A table without further columns whose headings are not as many as their cells, as on pages of Universal Robots:
     all of its own cells hold numbers, and a word follows them."""
-    (line, header), *rows = table
+    header, rows = table[0][1], [cells for _, cells in table[1:] if len(cells) != len(table[0][1])]
     width = 1 + max((k for k, name in enumerate(header) if quantities_of([name])), default=-1)
-    others = [cells for _, cells in rows if len(cells) != len(header)]
-    cut = [cells for cells in others if len(cells) > width and all(re.search(r"\d|π", cell) for cell in cells[1:width])]
-    ended = [cells for cells in cut if re.fullmatch(r"[^\W\d]+", cells[width])]
-    return [(number, cells[:width]) for number, cells in table] if rows and len(ended) == len(rows) else table
+    ended = [cells for cells in rows if len(cells) > width and re.fullmatch(r"[^\W\d]+", cells[width])]
+    cut = ended and all(re.search(r"\d|π", cell) for cells in ended for cell in cells[1:width])
+    return [(line, cells[:width]) for line, cells in table] if cut and len(ended) == len(table) - 1 else table
 
 
 def _stacked(text: str) -> list[Grid]:
@@ -613,10 +612,14 @@ class _Table:
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
         if k is not None:
             types = [cells[k].strip().lower() for _, cells in self.rows]
-            said = {number or other: kind or word for kind, number, other, word in _KIND_SAID.findall(text.lower())}
-            if {*types} == {"1"} and "1" not in said:
-                self._refuse(None, k, "1 may be a joint that turns or one that slides", "Write revolute or prismatic")
-            return [said.get(each, _KINDS.get(each, each)) for each in types]
+            given = {number or other: kind or word for kind, number, other, word in _KIND_SAID.findall(text.lower())}
+            if not {*types} <= {*given} or "revolute" not in map(given.get, types):  # or how many there are of a kind
+                given = _KINDS
+                if {*types} == {"1"}:
+                    self._refuse(
+                        None, k, "1 may be a joint that turns or one that slides", "Write revolute or prismatic"
+                    )
+            return [given.get(each, each) for each in types]
         turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
         blank = [each is None for each in self._of("theta")]  # which says nothing of what moves
         starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]

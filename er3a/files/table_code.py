@@ -173,7 +173,7 @@ def _symbols(rows: Grid) -> Words:
     columns = (re.sub(of_pi, "alpha1", " ".join(cells)) for cells in zip(*(cells for _, cells in rows)))
     found = ({*re.findall(r"(?<![^\W\d_])(?![lL]_?\d)[^\W\d_]+(?=_?\d+\b)", text)} for text in columns)
     names = [each.pop() if len(each) == 1 else "" for each in found]
-    if names.count("") == 1 and len(names) == 4:  # a length that is L2, beside d1 and theta1, is a
+    if names.count("") == 1 and len(names) == 4:  # a length L2 among d1 and theta1 is a
         k = names.index("")
         names[k] = "a" if re.search(r"[lL]_?\d", " ".join(cells[k] for _, cells in rows)) else ""
     return names if names_columns(names) else []
