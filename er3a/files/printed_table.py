@@ -268,7 +268,8 @@ def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
 def _readers(text: str, columns: Sequence[str]) -> Iterator[tuple[Callable[[], list[Grid]], str]]:
     """What reads a text, and what it takes it for: marks of a document, a program, or lines."""
     if columns:
-        yield lambda: code_grids(text, headed=False), "program"
+        bare = (grid for grid in code_grids(text, headed=False) if len(grid[0][1]) == len(columns))
+        yield partial(list, [[(0, [*columns]), *grid] for grid in bare]), "program"
     yield lambda: html_grids(text) or latex_grids(text), "marks"
     yield lambda: code_grids(text), "program"
     for mark, grid in line_grids(text):
@@ -380,10 +381,11 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
             settled = "type" in header or not said <= _TYPES
         else:
             settled = "direction" in header or not said & {"-1", "-1.0"} if of_signs else bool(own.strip("0."))
-        if len(cells) != len(rows) or settled:
-            continue
         of_angles = re.match(r"(?i)(?:th|q|joint|angle).*offset", name) and f"- {name}" not in text
-        if of_signs or (not of_types and ({"theta", "offset"} & {*quantities} or not of_angles)):
+        whole = len(cells) == len(rows)
+        if settled or not (whole or of_angles):
+            continue
+        if of_signs or (not of_types and ({"theta", "offset"} & {*quantities} or not (of_angles and whole))):
             what = "directions" if of_signs else "offsets"
             raise InputError(
                 path,

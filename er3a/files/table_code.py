@@ -149,8 +149,8 @@ def _listed(code: Code) -> Grid:
             continue
         if label and not re.search(r"(?<!\w)\[|[{:]", group.inside):
             cells = row_cells(group.inside)
-            numeric = sum(bool(re.search(r"\d|pi|π", cell)) for cell in cells)
-            if len(cells) == len(rows[0][1]) if rows else 4 <= len(cells) <= min(2 * numeric, MOST_COLUMNS):
+            begun = 4 <= len(cells) <= MOST_COLUMNS and re.search(r"\d|pi|π", group.inside)
+            if len(cells) == len(rows[0][1]) if rows else begun:
                 rows.append((code.line(group.start), cells))
                 labels.append(label[1] or label[2] or "")
                 arms.add((label[2] or "").rstrip("0123456789"))

@@ -292,6 +292,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "Name theta [rad] a [m] d [m] alpha [rad] Mass [kg]\nJoint 1 0 0 0.1 0 2.5\nJoint 2 0 0.4 0 0 3.5 1\n",
             "fields",
         ),
+        ("# d, a, alpha\nrows = [[0.3, 0, -pi/2],\n        [0, 0.3, 0]]\nq_offset = [0, pi/2, 0]", "q_offset"),
         ("# d, a, alpha\nrows = [[0.3, 0, -pi/2],\n        [0, 0.3, 0]]\ntheta0 = [0, pi/2]", "theta0"),
         ("L = [Link([0 0.3 0 pi/2])];\nL(2).offset = 1;\nL(3).offset = 2;", "call"),
         ("L(1) = Link([0 0.1 0 pi/2]);\nL(2) = Link(dh(2,:));", "line 2"),
@@ -513,7 +514,7 @@ def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
 @pytest.mark.parametrize(("brace", "a2"), [("", "0.27"), ("\n", "lengths['upper']"), ("", "self.lengths['upper']")])
 def test_no_row_of_named_rows_is_left_out(tmp_path, brace, a2):
     given = "import math\nself.lengths = {'base': 0.29, 'upper': 0.27}\nL = [0.29, 0.27]\n"
-    rows = f"arm = {{{brace}'s': [L[0], 0, 0, -90],\n 'e': [0, -90, {a2}, 0]}}"
+    rows = f"low = 0\narm = {{{brace}'s': [L[0], 0, low, -90],\n 'e': [low, -90, {a2}, 0]}}"
     content, _ = read(tmp_path, given + rows, columns=["d", "offset", "a", "alpha"])
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
 
