@@ -83,7 +83,7 @@ def read_dh_table(
         None means mm and deg, unless the values can't be
     as_printed : keep values in the unit that their column says although they look like another; each gives a
         :class:`er3a.errors.DoubtfulUnit`. Otherwise they are refused. Columns that say no unit are taken for what their
-        values look like, with a doubt too
+        values can only be, with a note
     columns : what the columns mean, as :func:`er3a.files.printed_table.printed_table` takes it
     text : of the file, if it has been read
 
@@ -98,7 +98,7 @@ def read_dh_table(
         naming row and column, or the field of the robot file that the values do not fit
     """
     path = Path(path)
-    printed = _printed(path, columns, text)
+    printed = _printed(path, columns, text, convention)
     header = printed.lines[0][1] if printed.lines else []
     names = {_usual_unit(column)[0]: column for column in header}
     known = NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in names}
@@ -185,7 +185,9 @@ def _known_as(content: RobotFile) -> tuple[Convention | None, str]:
     return nearer if near and clear else None, nearer if near else ""
 
 
-def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -> PrintedTable:
+def _printed(
+    path: Path, columns: Sequence[str] = (), text: str | None = None, convention: Convention | None = None
+) -> PrintedTable:
     """The table that a file holds, under er3a's headings.
 
     Raises
@@ -194,7 +196,7 @@ def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -
         for a file without one
     """
     text = table_text(path) if text is None else text
-    found = printed_table(path, text, columns)
+    found = printed_table(path, text, columns, convention)
     if found is None and path.suffix != ".csv":
         problem = nearest_headings(text) or "no row of headings with a, alpha and d was found"
         remedy = (
@@ -362,7 +364,6 @@ def _in_own_units(
         turned = {column for column in turned if _in_radians(rows, column)} if found else set()
         named = ", ".join(sorted(turned))
         if turned and "alpha_deg" in without_unit:
-            doubt(None, named, f"{rows[0]['alpha_deg']:g} deg", "radians", file=path)
             yield f"{named} were read as radians; --angle-unit deg if they are degrees"
         elif turned:
             yield f"{named} look like radians: give --angle-unit rad if they are"
@@ -393,7 +394,8 @@ def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: boo
         remedy = f"Name the columns a_{likely} and d_{likely}, or give --length-unit {likely}"
         remedy += " (or mm)" if longest > SHORTEST_PLAIN_LENGTH_MM else ""
         raise InputError(path, "columns a_mm, d_mm", problem, remedy)
-    doubt(None, "columns a, d", f"{longest:g} mm at most", word, file=path)
+    if not unsaid or likely != "m":  # no arm's lengths are below a millimetre
+        doubt(None, "columns a, d", f"{longest:g} mm at most", word, file=path)
     return likely if unsaid else "mm"
 
 
@@ -410,19 +412,20 @@ def headed_units(
     angle_unit: AngleUnit | None = None,
     columns: Sequence[str] = (),
     text: str | None = None,
+    convention: Convention | None = None,
 ) -> dict[str, str]:
     """The unit of each column of a D-H table, as its heading says it.
 
     Parameters
     ----------
-    length_unit, angle_unit, columns, text : as of :func:`read_dh_table`; the units are of headings that say mm and deg,
-        or nothing
+    length_unit, angle_unit, columns, text, convention : as of :func:`read_dh_table`; the units are of headings that say
+        mm and deg, or nothing
 
     Returns
     -------
     units : such as ``{"a": "in", "alpha": "rad", "lower": "deg"}``
     """
-    lines = _printed(path, columns, text).lines
+    lines = _printed(path, columns, text, convention).lines
     meant = {"mm": length_unit or "mm", "deg": angle_unit or "deg"}
     units = {name.partition("_")[0]: _unit_of(name) for name in (lines[0][1] if lines else ())}
     return {name: meant.get(unit, unit) for name, unit in units.items() if unit in (*PER_MM, "deg", "rad")}

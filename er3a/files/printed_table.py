@@ -161,7 +161,9 @@ def _pasted() -> bytes:
     return sys.stdin.buffer.read(MAX_BYTES)
 
 
-def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> PrintedTable | None:
+def printed_table(
+    path: Path, text: str, columns: Sequence[str] = (), convention: Convention | None = None
+) -> PrintedTable | None:
     """The one D-H table in a text, under er3a's headings, its cells as numbers.
 
     Parameters
@@ -169,6 +171,7 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     path : named in errors
     columns : what the columns mean, in their order, in place of their headings: ``theta``, ``d``, ``a``, ``alpha``,
         ``joint``, ``offset``, or ``-`` for one that is not read
+    convention : the reader's, of a text that names both
 
     Returns
     -------
@@ -194,7 +197,7 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     if len(tables) > 1:
         problem = f"{len(tables)} D-H tables, at lines {' and '.join(str(t[0][0] or t[1][0]) for t in tables[:2])}"
         raise InputError(path, None, problem, "Give a file with one of them")
-    return _Table(path, text, tables[0], from_code).converted()
+    return _Table(path, text, tables[0], from_code, convention).converted()
 
 
 def _differ(one: Grid, other: Grid) -> bool:
@@ -372,7 +375,8 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
     """A program's table with a separate list of types as a column, and one of offsets if no theta is in the table; a
     list of directions is asked back, as an offset may be added before or after."""
     (line, header), *rows = grid
-    found = [(each[1], re.findall(r"[^,;\s\"']+", each[2])) for each in _LISTS.finditer(text)]
+    lists = [(each[1], re.findall(r"[^,;\s\"']+", each[2])) for each in _LISTS.finditer(text)]
+    found = [each for each in lists if len(each[1]) > 1]  # not an element: offset = table[i]
     own = "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == ["offset"])
     for name, cells in [("type", _JOINTS.findall(text)), *found]:
         quantities, said = quantities_of(header), {each.lower() for each in cells}
@@ -405,7 +409,7 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
 class _Table:
     """A table with its headings, of which each cell becomes an amount."""
 
-    def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
+    def __init__(self, path: Path, text: str, grid: Grid, from_code: bool, convention: Convention | None):
         self.path, self.notes, self.unsaid = path, Words(), set[str]()
         of_words = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", of_words) if from_code else without_latex(plain(of_words))
@@ -427,7 +431,7 @@ class _Table:
         self.column = dict[str, int]()
         self.given = self._given(Lists(program(text)) if from_code else None)
         self._check_headings()
-        self.convention = self._stated(program(text) if from_code else None, text)
+        self.convention = self._stated(program(text) if from_code else None, text, convention)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
         if from_code and (coupled := COUPLED.search(self.text)):
@@ -472,8 +476,9 @@ class _Table:
                 "Say which by --column: a for d and d for r (Khalil), or d for d and a for r",
             )
 
-    def _stated(self, code: Code | None, text: str) -> Convention | None:
-        """The convention that headings, the program, or the text around the table says, a program before words."""
+    def _stated(self, code: Code | None, text: str, asked: Convention | None) -> Convention | None:
+        """The convention that headings, the program, or the text around the table says, a program before words; the
+        one asked for where these say both."""
         if "convention" in self.header:
             return None
         if {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")} == {True}:
@@ -484,8 +489,10 @@ class _Table:
         library |= code.conventions if code else set()
         for part in (code.text if code else "", near, text):
             said = library | {name for name, sign in SIGNS.items() if sign.search(part)}
+            if len(said) > 1 and asked:
+                return asked
             if len(said) > 1 and part is not text:
-                remedy = "Leave one of them, or add a column convention"
+                remedy = "Give --convention, or leave one of them"
                 raise InputError(self.path, "convention", "the text says standard and modified D-H", remedy)
             for one in CONVENTIONS if len(said) == 1 else ():
                 if one in said:

@@ -99,8 +99,8 @@ def read_arm(
         raise InputError(srdf, "--srdf", f"{source} is no URDF", "Give the URDF that the SRDF belongs to, or home_deg")
     if holds_table(source):
         form: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
-        form["text"] = text or table_text(path)
-        content, notes = read_dh_table(path, robot_name(path), convention, as_printed=as_printed, **form)
+        form |= {"text": text or table_text(path), "convention": convention}
+        content, notes = read_dh_table(path, robot_name(path), as_printed=as_printed, **form)
         robot = robot_of(content)
         return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
     if path.suffix in URDF:
