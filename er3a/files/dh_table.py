@@ -136,16 +136,9 @@ def read_dh_table(
     if short or 0 < longest < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
     found = parse(RobotFile, content, path, AS_PRINTED if as_printed else None)
-    way, near = (said, "") if said else _known_as(found)
-    why = "so it is a known arm's, as standard D-H none's"
-    if way is None and idle:
-        # A table whose axes are all parallel has no joint that says which link its lengths are of.
-        if near == "standard" or not rows[1]["alpha_deg"]:
-            raise _two_readings(path)
-        way, why = "modified", "as standard D-H, joints 1 and 2 would turn about one line"
-    if way == "modified" and not said:
+    if why := "" if said else _modified_as(path, found, rows if idle else []):
         form: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "as_printed": as_printed, "text": text}
-        other, assumed = read_dh_table(path, name, way, columns=columns, **form)
+        other, assumed = read_dh_table(path, name, "modified", columns=columns, **form)
         return other, (*assumed, f"read as modified D-H: {why}")
     return found, tuple(notes)
 
@@ -155,6 +148,18 @@ def _first_is_idle(rows: Sequence[CsvRow]) -> bool:
     would do one's work."""
     still = [not (row["a_mm"] or row["alpha_deg"]) for row in rows if row.get("type") not in FIXED]
     return sum(still) == 1 and still[0] and len(still) > 1 and {*map(_unit, rows[:2])} == {"deg"}
+
+
+def _modified_as(path: Path, found: RobotFile, idle: CsvRows) -> str:
+    """Why a table that says no convention is modified D-H, or nothing; ``idle``: its rows, if the first alone has
+    neither a nor alpha."""
+    way, near = _known_as(found)
+    if way or not idle:
+        return "so it is a known arm's, as standard D-H none's" if way == "modified" else ""
+    # A table whose axes are all parallel has no joint that says which link its lengths are of.
+    if near == "standard" or not idle[1]["alpha_deg"]:
+        raise _two_readings(path)
+    return "as standard D-H, joints 1 and 2 would turn about one line"
 
 
 def _two_readings(path: Path) -> InputError:
