@@ -115,8 +115,8 @@ def reaches(summary: model.WorkspaceSummary) -> str:
 
 
 def millimetres(values: Sequence[float]) -> str:
-    """Lengths (m) in whole mm, one after the other."""
-    return ", ".join(as_text(round(1000 * value) + 0, "d") for value in values)
+    """Lengths (m) in whole mm, one after the other on one line."""
+    return ",\u00a0".join(as_text(round(1000 * value) + 0, "d") for value in values)
 
 
 def stand_text(stand: model.StandSummary, placement: model.PlacementSummary) -> str:

@@ -52,7 +52,7 @@ def _(results: ValidationResults) -> Glance:
         stated = [each.expected for each in conflict.statements]
         return value, tr("sources differ by {off}", off=with_unit(fixed(max(stated) - min(stated), 1), conflict.unit))
     left = len(evidence.unconfirmed) if evidence else 0
-    return value, tr("{count} to confirm", count=left) if left else ""
+    return value, tr("{count} entries to confirm", count=left) if left else ""
 
 
 @glance.register

@@ -183,6 +183,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float = 0.0) -
         float(bool(parts)),
         parts,
         fix_of([fault]),
+        fault.meant,
     )
 
 

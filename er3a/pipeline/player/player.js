@@ -152,7 +152,7 @@ function draw() {
   for (const { from, to, text } of marks) {
     if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
     else space.line([from, to], text ? css : page.ink, text ? 4 : 3), text && [from, to].forEach((end) => space.dot(end, css, 4));
-    space.keepClear([0, 0.25, 0.5, 0.75, 1].map((part) => add(scaled(from, 1 - part), scaled(to, part))), 0);
+    space.keepClear(Array.from({ length: 17 }, (_, k) => add(scaled(from, 1 - k / 16), scaled(to, k / 16))), 0);
   }
   if (motion.loads) tellLoads(poses[0]);
   for (const [j, { status }] of failing()) {
@@ -184,15 +184,15 @@ function singularAxis(j, T, named) {
   if (!named) space.word(`J${j}`, add(middle, way), space.page.doubtful);
 }
 
-/** What each joint bears now, as a bar of the most that any bears on this motion. */
+/** What each joint bears now. */
 function tellLoads(poses) {
   const most = Math.max(...motion.loads.flat().map(Math.abs).filter(Number.isFinite)) || 1;
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
   const loads = valuesAt(motion.times, motion.loads, t);
   loads.forEach((load, j) => {
     if (Number.isNaN(load)) return;
-    const felt = Math.abs(load) > 0.3 * most; // what is not is told in grey, without a bar
-    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt ? Math.abs(load) / most : null);
+    const felt = Math.abs(load) > 0.3 * most; // what is not is in grey
+    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt);
   });
 }
 

@@ -40,6 +40,8 @@ export class ArmView extends Space {
       const [from, to] = [poses, right].map((own) => column(own.at(-1), 3));
       other.shown.show(right, new Map(), look);
       this.keepClear(alongArm(right), ARM * reach);
+      this.word(document.getElementById("arm").dataset.own, column(poses[4], 3), this.page.touching);
+      this.word(document.getElementById("arm").dataset.right, column(right[3], 3));
       nearest = { from, to, text: data.words.flange_off.replace("{off}", `${(1000 * Math.hypot(...subtract(to, from))).toFixed(0)} mm`), touching: [] };
     }
     if (nearest?.text) this.#nearest(nearest);

@@ -45,6 +45,7 @@ class ListRow:
     length : of the bar, in parts of the longest
     parts : of the bar; without a length there is none
     fix : what to do instead, shown above the list while this row is the chosen one
+    meant : whether its file expects that it fails
     """
 
     mark: Mark
@@ -55,6 +56,7 @@ class ListRow:
     length: float = 0.0
     parts: Sequence[Part] = ()
     fix: Fix | None = None
+    meant: bool = False
 
 
 @frozen
@@ -123,9 +125,7 @@ def may_run(sound: int, due: int, caught: int, what: str) -> tuple[str, str]:
 
 def all_caught(count: int) -> str:
     """That all that is meant to fail does; empty where nothing is meant to."""
-    if count < 2:
-        return ("", tr("1 test fault, caught."))[count]
-    return tr("{count} test faults, all caught.", count=count)
+    return tr("Test faults caught: {count}.", count=count) if count else ""
 
 
 def lengths(durations_s: Iterable[float]) -> list[float]:

@@ -219,13 +219,13 @@ export class Space extends Orbit {
 
   /**
    * A word near a point in space, where no earlier word is in its way, nor what is kept clear; a line leads to it from afar.
-   * Where no place is free, one that is not `needed` is left out. With a `share` a bar below the word is filled that far.
+   * Where no place is free, one that is not `needed` is left out.
    */
-  word(text, point, css = this.page.ink, needed = true, share = null) {
-    const size = (share === null ? WORD : 1.1) * this.letters;
+  word(text, point, css = this.page.ink, needed = true) {
+    const size = WORD * this.letters;
     pen.font = `600 ${size}px system-ui, sans-serif`;
     const [x, y] = this.seen(point);
-    const [width, height] = [pen.measureText(text).width + 0.5 * size, (share === null ? 1.25 : 2.2) * size];
+    const [width, height] = [pen.measureText(text).width + 0.5 * size, 1.25 * size];
     const far = ([i, j]) => Math.hypot(Math.min(WIDE, width / height) * i, j);
     const places = PLACES.filter((place) => needed || far(place) < NEAR).sort((a, b) => far(a) - far(b)).map(([i, j]) => [x + i * width, y + j * height]);
     const seen = ([u, v]) => Math.min(u, this.width - u) > width / 2 + size && Math.min(v, this.height - v) > height / 2;
@@ -238,9 +238,7 @@ export class Space extends Orbit {
     this.taken.push([u, v, width, height, text]);
     const edge = [Math.min(u + width / 2, Math.max(u - width / 2, x)), Math.min(v + height / 2, Math.max(v - height / 2, y))];
     if (Math.hypot(edge[0] - x, edge[1] - y) > 0.4 * height) this.#svg("line", { x1: x, y1: y, x2: edge[0], y2: edge[1], stroke: css });
-    const bar = { x: u - width / 2, y: v + 0.3 * size, height: 0.6 * size, rx: 0.2 * size };
-    for (const [part, fill] of share === null ? [] : [[1, this.page.grid], [share, this.page.muted]]) this.#svg("rect", { ...bar, width: part * width, fill });
-    this.#svg("text", { x: u, y: share === null ? v : v - 0.4 * size, fill: css, stroke: this.page.halo, "font-size": size }, text);
+    this.#svg("text", { x: u, y: v, fill: css, stroke: this.page.halo, "font-size": size }, text);
   }
 
   /** The names of what is around the arm: those of `needed` in a colour of their own, then others as far as there is room. */

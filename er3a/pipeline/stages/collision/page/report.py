@@ -81,36 +81,36 @@ def _answer(
     lines = [0.0, *([shapes.margin_mm] if shapes else [])]
     ends = [0.0, *(each.clearance_mm for each in closest)]
     span = min(ends), max(ends)
-    scale = tr("bars {low} to {high} mm", low=fixed(span[0], 0), high=fixed(span[1], 0))
-    second = tr("shapes assumed: keep {mm:g} mm", mm=shapes.margin_mm) if shapes else ""
+    ticks = ", ".join(f"{each:g}" for each in lines)
+    scale = tr("bars {low} to {high} mm, ticks {ticks}", low=fixed(span[0], 0), high=fixed(span[1], 0), ticks=ticks)
     near = shapes.near if shapes else ()
     rows = [_row(each, unreached, near, known.get(each.name), span, lines) for each in closest]
-    hit, clear, partly = (
+    hit, clear, elsewhere, partly = (
         [row for row in rows if row.mark in marks]
-        for marks in (("fail",), ("pass", "caution", "no_reference"), ("none",))
+        for marks in (("fail",), ("pass", "caution"), ("no_reference",), ("none",))
     )
     blocked = len(params.get("blocked", ()))
     in_vain = tr("{count} targets collide in every solution.", count=blocked) if blocked else ""
     caught = len(params.get("demonstrations", ()))
     due = len(rows) + blocked - caught - len(partly)
-    headline = tr("{count} of {due} poses and paths clear.", count=len(clear), due=due)
+    headline = tr("{count} of {due} poses and paths clear.", count=len(clear + elsewhere), due=due)
     keys = [
         (with_unit(fixed(each.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=each.name))
         for each in closest
         if each.clearance_mm >= 0
     ][:1]
-    titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
+    titled = (
+        (tr("Collide"), hit),
+        (tr("Clear, nearest first"), clear),
+        (tr("Clear, but fail at Paths"), elsewhere),
+        (tr("Clear as far as reached"), partly),
+    )
     return Answer(
         headline,
         all_caught(caught),
         in_vain,
         keys,
-        [
-            Group(
-                joined([title, scale if own is (hit or clear) else "", second if own is clear else ""]), own[:MAX_ROWS]
-            )
-            for title, own in titled
-        ],
+        [Group(joined([title, scale if own is (hit or clear) else ""]), own[:MAX_ROWS]) for title, own in titled],
         next((row.fix for row in hit if row.fix), None),
     )
 
@@ -133,14 +133,15 @@ def _row(
         mark = "none"
     fault = fault if of_path else None
     if fault and mark == "pass":
-        note = tr("{far} mm; fails at Paths", far=fixed(found.clearance_mm, 1))
         mark = "no_reference"
     fix = fix_of([fault]) if fault and fault.instead and mark == "fail" else None
     zero, end = np.interp([0.0, found.clearance_mm], span_mm, [0.0, 1.0])
     own: PartMark = "fail" if mark == "fail" else "none" if mark == "none" else "pass"
     lines = [Part(at, at, "zero") for at in np.interp(lines_mm, span_mm, [0.0, 1.0]).tolist()]
     parts = [Part(0.0, 1.0, "rest"), Part(min(zero, end), max(zero, end), own), *lines]
-    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), 1.0, parts, fix)
+    return ListRow(
+        mark, found.name, note, "", (found.name, found.t_s or 0.0), 1.0, parts, fix, bool(fault and fault.meant)
+    )
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

@@ -46,7 +46,6 @@ def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
         at_rest(
             robot,
             holding_name(each.joint),
-            holding_text(each),
             q=meant(robot, np.array(each.q)),
             loads=np.tile(each.all_there, (2, 1)),
             marks=_weight(robot, results.summary.masses, each),
@@ -109,12 +108,6 @@ def within(value: float, tolerance: float, decimals: int = 2) -> str:
 def holding_name(joint: int) -> str:
     """What the player calls the pose in which a joint holds most, an address on the page as well."""
     return tr("J{joint}, held", joint=joint).replace(" ", "\u00a0")
-
-
-def holding_text(held: HoldingTorque) -> str:
-    """What a joint holds at rest in the worst pose that was found, with the tolerance of the masses."""
-    torque = with_unit(within(abs(held.torque), held.tolerance), held.unit)
-    return tr("J{joint} holds {torque} in the worst pose found.", joint=held.joint, torque=torque)
 
 
 def _peak(load: JointLoad) -> str:

@@ -17,7 +17,7 @@ from er3a.pipeline.player.motions import at_rest
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
-from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, holding_text, motions, within
+from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, motions, within
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
 from er3a.pipeline.viewing.figures import SIDE, axis_label, new_figure
@@ -152,7 +152,8 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         held = model.hardest_held(summary.holding) if summary.holding else None
         if held is None:
             return Answer(tr("Torques need the links' masses."), tr("No usable ones are given."), keys=[payload])
-        return Answer(holding_text(held), keys=[payload])
+        torque = with_unit(within(abs(held.torque), held.tolerance), held.unit)
+        return Answer(tr("J{joint} bears most: {torque}.", joint=held.joint, torque=torque), keys=[payload])
     worst = _worst(summary.motors)
     limited = _limited(summary)
     over = [f"J{motor.joint}" for motor in summary.motors if _mark(motor) == "fail"]

@@ -93,7 +93,8 @@ def _answer(targets: model.TargetRows, shown: Sequence[model.TargetResult]) -> A
     headline = tr("{count} of {due} poses reached.", count=targets.reached.sum(), due=len(targets) - caught)
     clear = targets.clearance_mm[np.isfinite(targets.clearance_mm)]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if len(clear) else []
-    rows = [_row(each) for each in shown]
+    nearest = sorted(shown, key=lambda each: each.clearance.least_mm if each.clearance else np.inf)
+    rows = [_row(each) for each in nearest]
     return Answer(
         headline,
         all_caught(caught),
@@ -127,7 +128,8 @@ def _row(target: model.TargetResult) -> ListRow:
     elif target.advice and mark == "fail":
         seen = address_of("inverse", target.name, 1.0, target.name) if near and near.shifted_to_mm else ""
         fix = Fix(say(target.advice[-1]), seen)
-    return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix)
+    meant = target.outcome == target.expect != "reached"
+    return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), fix=fix, meant=meant)
 
 
 def _jogged(q_deg: Iterable[float]) -> Fix:

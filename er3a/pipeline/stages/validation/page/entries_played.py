@@ -59,12 +59,9 @@ def reach_played(robot: Robot, reach: AxisDistance, q: Reals, conflict: Conflict
     for row, stated in enumerate(conflict.statements, 1):
         below = start + (height - row * BELOW * np.linalg.norm(far)) * axis
         end = below + stated.expected / MM * far / np.linalg.norm(far)
-        text = with_unit(fixed(stated.expected, 1), conflict.unit)
+        text = joined([own_title(stated.document), with_unit(fixed(stated.expected, 1), conflict.unit)], ": ")
         marks.append(_mark(below, end, text))
-    said = joined(
-        joined([own_title(each.document), with_unit(fixed(each.expected, 1), conflict.unit)], ": ")
-        for each in conflict.statements
-    )
+    said = say(conflict.subject).capitalize()
     return at_rest(robot, robot.name, said, q=q, marks=marks, turned=LOOKED_FROM[0] - AZIMUTH, elevation=0.0)
 
 

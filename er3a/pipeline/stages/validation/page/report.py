@@ -213,10 +213,11 @@ def _steps(
     before = [{"title": tr("Sources disagree."), "counted": False, "rows": asked}] if asked else []
     if not jogs:
         return [*before, {"title": tr("Confirm in this order"), "beside": tr("if wrong, tool off by"), "rows": first}]
+    off = tr("wrong: up to {off}", off=first[0].note)
     then = [replace(row, fix=Fix(row.name, row.address, instead=False)) for row in first[1:]]
     return [
         *before,
-        {"title": f"❶ {first[0].name}", "beside": tr("if wrong, up to {off}", off=first[0].note), "rows": jogs},
+        {"title": f"❶ {bracketed(first[0].name, off)}", "rows": jogs},
         {"title": "", "rows": then},
     ]
 

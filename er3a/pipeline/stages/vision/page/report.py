@@ -31,7 +31,7 @@ from er3a.pipeline.stages.vision.page.played import (
     seen_shapes,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
 from er3a.pipeline.viewing.figures import SIDE, new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
@@ -213,9 +213,7 @@ def _answer(results: model.VisionResults, task: VisionFile, scene: Path | None) 
     shown = [_row(each, grasp_moment(results, each), fix) for each in ordered]
     refused = [row for row in shown if row.mark == "fail"]
     groups = [
-        Group(
-            all_caught(caught) if caught == len(refused) else tr("Can't be grasped"), refused, caught != len(refused)
-        ),
+        Group(tr("Can't be grasped"), refused),
         Group(tr("Can be grasped"), [row for row in shown if row.mark == "pass"]),
     ]
     if found:
@@ -232,7 +230,15 @@ def _row(each: model.ObjectResult, moment: tuple[str, float], fix: Fix | None) -
         text = tr("{percent} % succeed", percent=fixed(100 * each.grasp.probability, 1))
         return ListRow("pass", each.name, text, "#objects", moment, fix=fix)
     there = address_of("vision", moved_name(each), 0.0, "objects") if each.moved_to_mm else ""
-    return ListRow("fail", each.name, refusal_text(each), "#objects", moment, fix=Fix(moved_text(each), there))
+    return ListRow(
+        "fail",
+        each.name,
+        refusal_text(each),
+        "#objects",
+        moment,
+        fix=Fix(moved_text(each), there),
+        meant=each.outcome == each.expect,
+    )
 
 
 def _why_left_out(found: Finding) -> str:
