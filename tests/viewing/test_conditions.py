@@ -190,7 +190,7 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     }
     sound = {"programs": ["through"]}
     assert line_of(placing(stored, robot, {}, sound)) == (
-        "On a stand 275 mm high on table, centre (350, 0, 400) mm, edges 150 × 200 × 50 mm along x, y, z: "
+        "On a stand 275 mm high on table, centre (350,\u00a00,\u00a0400) mm, edges 150 × 200 × 50 mm along x, y, z: "
         "in the way of 1 of the 1 motions that pass without it: through."
     )
     placement = stored["workspace"].results.summary.placement
@@ -199,7 +199,7 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     stored["workspace"].results.summary.placement = replace(placement, stands=(*placement.stands, floor))
     found = placing(stored, robot, {}, sound)
     assert line_of(found) == (
-        "On a stand 375 mm high on floor, centre (350, 500, 400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
+        "On a stand 375 mm high on floor, centre (350,\u00a0500,\u00a0400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
         "of 0 of the 1 motions that pass without it."
     )
     assert [each.hindered for each in found.tried] == [[], ["through"]]
@@ -241,7 +241,7 @@ def test_the_workspace_page_says_where_a_tray_stands_and_what_to_do_first():
     found = placing({"workspace": SimpleNamespace(results=results)}, load_robot("er3a_c60"), {}, {})
     rows = dict(tray_rows(found, results, results.summary.placement, "At most 2 kg."))
     assert rows["Payload there"] == "At most 2 kg."
-    assert rows["Place"].startswith("In the air: no surface is known there, centre (350, 0, 400) mm")
+    assert rows["Place"].startswith("In the air: no surface is known there, centre (350,\u00a00,\u00a0400) mm")
     assert "scene file as boxes, and run again" in rows["What to do first"]
     assert "No tool is given" in rows["What to do first"]
 

@@ -40,13 +40,13 @@ export class ArmView extends Space {
       const [from, to] = [poses, right].map((own) => column(own.at(-1), 3));
       other.shown.show(right, new Map(), look);
       this.keepClear(alongArm(right), ARM * reach);
-      this.word(document.getElementById("arm").dataset.own, column(poses[4], 3), this.page.touching);
-      this.word(document.getElementById("arm").dataset.right, column(right[3], 3));
       nearest = { from, to, text: data.words.flange_off.replace("{off}", `${(1000 * Math.hypot(...subtract(to, from))).toFixed(0)} mm`), touching: [] };
     }
     if (nearest?.text) this.#nearest(nearest);
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
     else this.#axes(poses);
+    if (this.others.length) this.word(document.getElementById("arm").dataset.own, column(poses[4], 3), this.page.touching);
+    for (const other of this.others) this.word(document.getElementById("arm").dataset.right, column(this.#poses(q, other)[3], 3));
     this.names(this.surroundings, touching);
     this.end();
   }

@@ -81,8 +81,7 @@ def _answer(
     lines = [0.0, *([shapes.margin_mm] if shapes else [])]
     ends = [0.0, *(each.clearance_mm for each in closest)]
     span = min(ends), max(ends)
-    ticks = ", ".join(f"{each:g}" for each in lines)
-    scale = tr("bars {low} to {high} mm, ticks {ticks}", low=fixed(span[0], 0), high=fixed(span[1], 0), ticks=ticks)
+    scale = tr("bars {low} to {high}, keep {keep:g} mm", low=fixed(span[0], 0), high=fixed(span[1], 0), keep=lines[-1])
     near = shapes.near if shapes else ()
     rows = [_row(each, unreached, near, known.get(each.name), span, lines) for each in closest]
     hit, clear, elsewhere, partly = (

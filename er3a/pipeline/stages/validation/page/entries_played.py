@@ -56,13 +56,14 @@ def reach_played(robot: Robot, reach: AxisDistance, q: Reals, conflict: Conflict
     way = T[FRAME_OF_POINT[reach.point], :3, 3] - start
     height, far = way @ axis, way - (way @ axis) * axis
     marks = []
+    said = []
     for row, stated in enumerate(conflict.statements, 1):
         below = start + (height - row * BELOW * np.linalg.norm(far)) * axis
         end = below + stated.expected / MM * far / np.linalg.norm(far)
-        text = joined([own_title(stated.document), with_unit(fixed(stated.expected, 1), conflict.unit)], ": ")
+        text = with_unit(fixed(stated.expected, 1), conflict.unit)
         marks.append(_mark(below, end, text))
-    said = say(conflict.subject).capitalize()
-    return at_rest(robot, robot.name, said, q=q, marks=marks, turned=LOOKED_FROM[0] - AZIMUTH, elevation=0.0)
+        said.append(joined([own_title(stated.document), text], ": "))
+    return at_rest(robot, robot.name, joined(said), q=q, marks=marks, turned=LOOKED_FROM[0] - AZIMUTH, elevation=0.0)
 
 
 def entries_played(robot: Robot, cells: Mapping[str, Any], looks: Iterable[Finding]) -> list[PlayedMotion]:
