@@ -199,8 +199,8 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     stored["workspace"].results.summary.placement = replace(placement, stands=(*placement.stands, floor))
     found = placing(stored, robot, {}, sound)
     assert line_of(found) == (
-        "On a stand 375 mm high on floor, centre (350,\u00a0500,\u00a0400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
-        "of 0 of the 1 motions that pass without it."
+        "On a stand 375 mm high on floor, centre (350,\u00a0500,\u00a0400) mm, edges 150 × 200 × 50 mm along x, y, z: "
+        "in the way of 0 of the 1 motions that pass without it."
     )
     assert [each.hindered for each in found.tried] == [[], ["through"]]
     half = replace(found.tray.place, size_m=(0.0125, 0.15, 0.05))
