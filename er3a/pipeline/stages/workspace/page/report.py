@@ -93,8 +93,10 @@ def _answer(
         payload,
     ]
     groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
-    frames = tr("Reach from axis 1, tray's centre in base frame.")
-    return Answer(joined(said, " "), "", frames, keys, groups, fix)
+    frames = [tr("Reach from axis 1, tray's centre in base frame.")]
+    if placing and placing.tray.floor:
+        frames.append(tr("Its stand begins at z {height} mm.", height=millimetres([placing.tray.floor])))
+    return Answer(joined(said, " "), "", joined(frames, " "), keys, groups, fix)
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
