@@ -135,7 +135,7 @@ def to_confirm(evidence: TableEvidence | None) -> list[ListRow]:
     rows = []
     for text, kinds, place in steps:
         own = [each for each in left if column_of(each.entry) in kinds]
-        named = joined([entry_word(each.entry) for each in own[:3]], ", ") + (" …" if len(own) > 3 else "") or tr(
+        named = joined([entry_word(each.entry) for each in own[:2]], ", ") + (" …" if len(own) > 2 else "") or tr(
             "the table"
         )
         worst = max(own, key=lambda each: (each.off.mm, each.off.deg), default=None)

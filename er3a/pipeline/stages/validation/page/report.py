@@ -217,7 +217,7 @@ def _steps(
     then = [replace(row, fix=Fix(row.name, row.address, instead=False)) for row in first[1:]]
     return [
         *before,
-        {"title": f"❶ {bracketed(first[0].name, off)}", "rows": jogs},
+        {"title": f"❶ {first[0].name}", "beside": off, "rows": jogs},
         {"title": "", "rows": then},
     ]
 
@@ -257,7 +257,7 @@ def _stated(conflict: model.Conflict) -> str:
 
 
 def _to_measure(robot: str, conflict: model.Conflict) -> Fix:
-    text = tr("measure the {subject}: {values}?", subject=say(conflict.subject), values=_stated(conflict))
+    text = tr("measure the arm: {values}?", values=_stated(conflict))
     return Fix(text, address_of("validation", robot, 0.0, ""), instead=False)
 
 
