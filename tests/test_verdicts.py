@@ -274,15 +274,11 @@ def test_an_index_over_inputs_that_changed_since_says_so_as_verdicts_and_report_
         write_index(study, tmp_path / "results", tmp_path)
         return (tmp_path / "index.html").read_text(encoding="utf-8")
 
-    assert "Changed since" not in page()
+    assert "Made before" not in page()
     paths.write_text(paths.read_text(encoding="utf-8") + "# later\n", encoding="utf-8")
     index = page()
-    file, said = (
-        shown_path(paths),
-        "Changed since, so what stands here tells of what was before (run the study again): ",
-    )
-    assert index.count("Changed since") == 1
-    assert f'<p class="before caution">er3_600: {said}{file}.</p>' in index
+    assert index.count("Made before") == 1
+    assert f"Made before {shown_path(paths)} changed: run the study again." in index
     assert etree.parse(tmp_path / "junit.xml").getroot().get("failures") == "1"
 
 

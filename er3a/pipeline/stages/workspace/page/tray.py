@@ -81,7 +81,7 @@ class Tray:
         if self.floor is None:
             return whole_sentence(self.where)
         centre, gap = millimetres(self.place.centre_m), millimetres([self.low[2] - self.floor])
-        return tr("Tray:\u00a0({centre})\u00a0mm, stand {gap}\u00a0mm.", centre=centre, gap=gap)
+        return tr("Tray: ({centre}) mm, stand {gap} mm.", centre=centre, gap=gap)
 
     @property
     def where(self) -> str:
