@@ -278,7 +278,7 @@ def test_an_index_over_inputs_that_changed_since_says_so_as_verdicts_and_report_
     paths.write_text(paths.read_text(encoding="utf-8") + "# later\n", encoding="utf-8")
     index = page()
     assert index.count("Made before") == 1
-    assert f"Made before {shown_path(paths)} changed: run the study again." in index
+    assert f"Made before {shown_path(paths)} changed (run the study again)." in index
     assert etree.parse(tmp_path / "junit.xml").getroot().get("failures") == "1"
 
 
