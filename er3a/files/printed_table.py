@@ -432,8 +432,10 @@ class _Table:
         self.given = self._given(Lists(program(text)) if from_code else None)
         self._check_headings()
         self.convention = self._stated(program(text) if from_code else None, text, convention)
-        if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
-            self.notes.append("base and tool of the program are not read")
+        # Below its print the Robotics Toolbox writes both, as translations t.
+        placed = r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)" if from_code else r"\b(?:base|tool)\W+t\s*="
+        if re.search(placed, text):
+            self.notes.append("base and tool of the text are not read")
         if from_code and (coupled := COUPLED.search(self.text)):
             self.notes.append(f"'{coupled[0]}' is not read: joints are taken to turn by themselves")
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}

@@ -1152,3 +1152,11 @@ def test_a_joint_of_a_toolbox_that_slides_has_no_d_of_its_own(tmp_path):
 def test_lists_d_and_r_as_khalil_names_them_are_asked_back(tmp_path):
     with pytest.raises(InputError, match="either can be the link's length"):
         read(tmp_path, "alpha = [0 -pi/2 0];\nd = [0 0 265];\nr = [159 0 0];\n")
+
+
+def test_base_and_tool_below_a_printed_table_are_named(tmp_path):
+    rows = [(0.0, -90.0, 290.0, 0.0), (270.0, 0.0, 0.0, -90.0)]
+    printed = box(rows, list(NAMES), "")
+    _, notes = read(tmp_path, printed + "\n│base │ t = 0, 0, 0; rpy/xyz = 0°, 90°, 0° │")
+    assert [note for note in notes if "base" in note] != []
+    assert [note for note in read(tmp_path, printed)[1] if "base" in note] == []
