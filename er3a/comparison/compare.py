@@ -21,7 +21,7 @@ import scipy
 from er3a.by_value import ByValue, Displayed, frozen
 from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
-from er3a.comparison.slips import SIDES, Cause, CauseCode, Explained, explain
+from er3a.comparison.slips import SIDES, Cause, CauseCode, Explained, explain, row_of
 from er3a.errors import RobotError
 from er3a.geometry.transforms import (
     exp_rotation,
@@ -415,12 +415,7 @@ def _named(robot: Robot, found: mechanism.EntryDifference) -> Difference:
 
 
 def _name(robot: Robot, column: str, link: int) -> str:
-    return f"{column}{_row_of(robot, column, link) + 1}"
-
-
-def _row_of(robot: Robot, column: str, link: int) -> int:
-    """The row (from 0) that holds what follows axis ``link``: a modified table has a, alpha and beta one row later."""
-    return link + (robot.convention == "modified" and column in ("a", "alpha", "beta"))
+    return f"{column}{row_of(robot, column, link) + 1}"
 
 
 def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
@@ -821,7 +816,7 @@ def _corrected(
     for each in found.differences:
         angle = each.column in ANGLES
         column = "offset" if each.column == "theta" else each.column
-        columns[column][_row_of(robot_a, column, each.link)] = _rounded(each.other, angle)
+        columns[column][row_of(robot_a, column, each.link)] = _rounded(each.other, angle)
     moved = tolerances.exceeded(found.zeros, robot_a.sliding)
     columns["direction"] = np.where(found.reverses, -1.0, 1.0) * robot_a.direction
     for k in np.flatnonzero(moved).tolist():

@@ -116,12 +116,29 @@ def explain(one: Robot, other: Robot, found: mechanism.Match, tolerances: mechan
 
 def _is_plain(robot: Robot, match: mechanism.Match, before: mechanism.Match, edits: Sequence[_Edit]) -> bool:
     """Whether much less geometry differs than before, or the arms are not merely defined otherwise: the base does not
-    lean, and all joints turn the same way or far less differs."""
+    lean, and all joints turn the same way or far less differs. A number that differs still is no slip undone."""
+    still = {f"{each.column}{row_of(robot, each.column, each.link) + 1}" for each in match.differences}
+    if not still.isdisjoint(name for edit in edits if edit.price < WHOLE for name in edit.slip.entries):
+        return False
     saved = before.cost - match.cost - _price(edits)
     if any(edit.price >= WHOLE for edit in edits) and saved < CLEARLY:
         return False
     turns_alike = _upright(robot, match) > UPRIGHT and (not match.reverses.any() or saved >= FAR)
     return match.rank[0] < before.rank[0] or turns_alike
+
+
+def row_of(robot: Robot, column: str, link: int) -> int:
+    """The row of an entry; a modified table has a, alpha and beta one row later.
+
+    Parameters
+    ----------
+    link : the axis (from 0) that the entry follows
+
+    Returns
+    -------
+    row : from 0
+    """
+    return link + (robot.convention == "modified" and column in ("a", "alpha", "beta"))
 
 
 def _upright(robot: Robot, match: mechanism.Match) -> float:
