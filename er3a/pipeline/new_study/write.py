@@ -28,7 +28,7 @@ STUDY = "config/config.yaml"
 SCENE = "data/scenes/cell.yaml"
 HELP = f"{REFERENCES}/README.md"
 SCHEMAS = ("study", "robot", "targets", "paths", "scene")
-TRAY_MM, TRAY_FOR_M = (200, 150, 50), 0.7  # an arm of less reach is asked for a smaller tray
+TRAY_FOR_M = 0.7  # reach that the study's tray is for; an arm of less is asked for a smaller one
 SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
 
@@ -129,7 +129,9 @@ def _study(robot: Robot) -> str:
     text = re.sub(r"(\n  samples: )\d+", rf"\g<1>{SAMPLES}", text, count=1)
     reach = reach_of(robot)
     share = min(1.0, reach.radius / TRAY_FOR_M)
-    text = re.sub(r"box_mm: .*", f"box_mm: {[10 * round(share * size / 10) for size in TRAY_MM]}", text, count=1)
+    (box,) = re.finditer(r"box_mm: \[(.*)\]", text)
+    sizes = [10 * round(share * float(size) / 10) for size in box[1].split(",")]
+    text = text.replace(box[0], f"box_mm: {sizes}", 1)
     pointing = reach.poses[:, :3, 2].round(6) + 0.0
     if not np.ptp(pointing, axis=0).any():
         text = text.replace("tool_direction: [0, 0, -1]", f"tool_direction: {pointing[0].tolist()}")
