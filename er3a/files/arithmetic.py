@@ -171,8 +171,6 @@ def _named(word: str, low: str, given: Mapping[str, str], depth: int) -> CellAmo
                 raise ValueError(f"holds {each} = {given[each]}, which {error}") from None
     if low in _RADIANS or UNITS.get(low) == "deg":
         return CellAmount(math.radians(1.0), "rad")
-    if found := re.fullmatch(r"(mm|cm|in)(?:_?to_?|2)m", low):  # which takes a number of mm to metres
-        return CellAmount(1.0, found[1])
     return CellAmount(0.0, "", {name_of(word): 1.0})
 
 

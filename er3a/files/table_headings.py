@@ -15,7 +15,7 @@ _JOINT = words_of(
     "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
-    "a=a aa=a r=a l=a d=d dd=d q=theta v=theta phi=theta φ=theta th=theta teta=theta tetha=theta thetha=theta "
+    "a=a r=a l=a d=d q=theta v=theta phi=theta φ=theta th=theta teta=theta tetha=theta thetha=theta "
     "alf=alpha alfa=alpha alp=alpha alph=alpha al=alpha offset=offset offsets=offset relativeoffset=offset "
     "theta0=offset θ0=offset th0=offset "
     "θoff=offset thoff=offset thetaoff=offset type=type jointtype=type sigma=type σ=type 类型=type"
