@@ -363,7 +363,8 @@ def best_of(
 ) -> list[tuple[str, Comparison]]:
     """A robot compared with several, the one that fits best first.
 
-    Fewest entries of geometry count first, then smallest differences. Causes are searched for in the best one alone.
+    One wrong entry is nearer than several; of several, those that differ slightly count for a part of one. Causes are
+    searched for in the best one alone.
 
     Parameters
     ----------
@@ -386,8 +387,13 @@ def _misfit(found: Comparison) -> tuple[float, ...]:
     """Less is a better fit."""
     if found.geometry is None:
         return (3.0,)
-    size = sum(abs(each.difference) for each in found.geometry.differences)
-    return {"equal": 0, "same_arm": 1}.get(found.verdict, 2), found.different_entries, size, found.geometry.worst_mm
+    gaps = [(abs(each.difference), SLIGHT.get(each.unit, 0.0)) for each in found.geometry.differences]
+    wrong = sum(gap / (gap + slight) for gap, slight in gaps)
+    return {"equal": 0, "same_arm": 1}.get(found.verdict, 2), min(len(gaps), 2), wrong, found.geometry.worst_mm
+
+
+SLIGHT = {"mm": 2.0, "deg": 0.3}
+"""A difference of so much counts half: more than tables are rounded by, less than arms differ by."""
 
 
 def _other_kinds(robot: Robot, kinds: Reals) -> GeometryLayer:
