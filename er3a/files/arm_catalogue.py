@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Mapping
 from functools import cache
 
@@ -78,6 +79,22 @@ def known_arms() -> Mapping[str, KnownArm]:
         origins = {row["key"]: Publication(row["title"], row["grade"]) for row in csv.DictReader(file)}  # type: ignore[arg-type]
     with ARMS.open(encoding="utf-8", newline="") as file:
         return {row["name"]: _known_arm(row, origins) for row in csv.DictReader(file)}
+
+
+def arms_like(word: str) -> dict[str, KnownArm]:
+    """Known arms that have a word in their name, or in maker and model: ``kr10r1100`` is in ``kr10_r1100_2``.
+
+    Parameters
+    ----------
+    word : only its letters and digits count; without any, all arms have it
+    """
+    arms = known_arms()
+    key = _letters(word)
+    return {name: arm for name, arm in arms.items() if key in _letters(f"{name} {arm.maker} {arm.model}")}
+
+
+def _letters(text: str) -> str:
+    return re.sub(r"[\W_]", "", text.lower())
 
 
 def _known_arm(row: Mapping[str, str], origins: Mapping[str, Publication]) -> KnownArm:

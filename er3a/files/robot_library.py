@@ -17,7 +17,7 @@ from er3a.comparison.compare import Uncompared, beside_the_table
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals
 from er3a.errors import InputError, InputWarning
 from er3a.files import robot_file
-from er3a.files.arm_catalogue import KnownArm, known_arms
+from er3a.files.arm_catalogue import KnownArm, arms_like, known_arms
 from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_table
 from er3a.files.kept_files import ROOT, names, own_or_shipped
 from er3a.files.printed_table import table_text
@@ -43,6 +43,7 @@ from er3a.robots.robot import (
 
 URDF = (".urdf", ".xacro", ".xml")
 ROBOTS = ROOT / "data" / "robots"
+MOST_NAMED = 9  # known arms that a word may mean
 MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
@@ -279,8 +280,8 @@ def robot_path(name_or_path: str | Path) -> Path:
     if text in known_arms():
         problem = f"'{text}' is a known arm; a study needs its file"
         raise InputError(None, None, problem, f"Write it: er3a arms {text} --output data/robots/{text}.yaml")
-    alike = [name for name in known_arms() if text and text.lower() in name]
-    known = ", ".join(alike or names("data/robots", "*.yaml"))
+    alike = arms_like(text) if len(text) > 1 else {}
+    known = ", ".join([*alike][:MOST_NAMED] or names("data/robots", "*.yaml"))
     remedy = f"Known: {known}; those of er3a arms; or give a path ending in .yaml"
     raise InputError(None, None, f"there is no robot '{text}'", remedy)
 

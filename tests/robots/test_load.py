@@ -220,7 +220,9 @@ def test_loading_by_path_and_by_name_agree():
     [
         ("er3_60", "er3_600;"),
         ("IRB46", "irb4600_20_250, irb4600_40_255, irb4600_60_205;"),
-        *((name, "er3_600, er3a_c60, er3a_c60_article") for name in ("", "../robots/er3_600", "er3_600\0")),
+        ("ABB IRB 4600-20", "irb4600_20_250;"),
+        ("er3_600\0", "er3_600;"),
+        *((name, "er3_600, er3a_c60, er3a_c60_article") for name in ("", "../robots/er3_600")),
     ],
 )
 def test_an_unknown_name_lists_the_known_ones(name, known):

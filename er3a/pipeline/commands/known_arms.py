@@ -19,16 +19,12 @@ def arms(
     as_json: options.AsJson = False,
 ):
     """List known arms by name, with maker, joints, reach and source. All commands take their names."""
-    from er3a.files.arm_catalogue import known_arms
+    from er3a.files.arm_catalogue import arms_like, known_arms
     from er3a.files.robot_writer import write_robot
     from er3a.pipeline.messages.known_arms import COLUMNS, arm_record, arm_row, provenance_lines
 
     known = known_arms()
-    found = {
-        name: arm
-        for name, arm in known.items()
-        if name == word or (word not in known and word.lower() in f"{name} {arm.maker} {arm.model}".lower())
-    }
+    found = {word: known[word]} if word in known else arms_like(word)
     if not found:
         raise Er3aError(f"no known arm has '{word}' in its name, maker or model; er3a arms lists all")
     if output:
