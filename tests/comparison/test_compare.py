@@ -495,6 +495,9 @@ def test_the_arm_that_fits_best_comes_first():
     right = er3a.load_robot("er3_600")
     others = {f"{mm}": right.replace(a=right.a + np.array([0, mm / 1000, 0, 0, 0, 0])) for mm in (300, 20, 0, -50)}
     assert [name for name, _ in best_of(right, others)] == ["0", "20", "-50", "300"]
+    shifts = {"three slight": [2, -1, 1, 0, 0, 0], "two gross": [0, 300, 90, 0, 0, 0], "one": [0, 300, 0, 0, 0, 0]}
+    others = {name: right.replace(a=right.a + np.array(mm) / 1000) for name, mm in shifts.items()}
+    assert [name for name, _ in best_of(right, others)] == ["one", "three slight", "two gross"]
 
 
 def with_columns(folder, *, scale: float = 1.0, twice: bool = False):
