@@ -66,7 +66,7 @@ def plain(file: Path, arguments: list[str]) -> Iterator[tuple[Path, bool]]:
     with chdir(file.parent), plain_urdf(file, arguments) as path, TemporaryDirectory() as folder:
         text, off = with_right_angles(path.read_text(encoding="utf-8"))
         own = Path(folder, "arm.urdf")
-        own.write_text(text, encoding="utf-8")
+        own.write_text(text.replace('effort="-1"', 'effort="0"'), encoding="utf-8")  # unknown; Pinocchio rejects -1
         yield own, off
 
 

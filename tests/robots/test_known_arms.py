@@ -114,10 +114,12 @@ def test_a_far_table_is_not_named(tmp_path):
 
 
 def test_no_arm_is_near_whose_joints_are_of_other_kinds():
-    """The Stanford arm's third joint slides, as that of no known arm does."""
-    stanford = load_robot("er3a_c60").replace(sliding=np.arange(6) == 2)
-    assert likely(stanford, {name: arm.robot for name, arm in known_arms().items()}) == []
-    assert best_of(stanford, {}) == []
+    """The Stanford arm's third joint slides; of six joints the second one slides in no known arm."""
+    robots = {name: arm.robot for name, arm in known_arms().items()}
+    table = load_robot("er3a_c60")
+    assert likely(table.replace(sliding=np.arange(6) == 1), robots) == []
+    assert likely(table.replace(sliding=np.arange(6) == 2), robots) == ["stanford_arm"]
+    assert best_of(table, {}) == []
 
 
 @pytest.mark.long
