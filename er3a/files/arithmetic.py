@@ -45,7 +45,7 @@ _TOKEN = re.compile(
 _NOTED = re.compile(r"(?<![\w.])\d[\d.]*\s*[(\[]|^\s*[-+]?(?!10\^)[\d.]+\s*\^\s*\d+\s*$")
 """A number with a footnote or its last digits' error, ``72²`` or ``72.5(2)``: neither a power nor a product."""
 _PI = re.compile(r"π|(?:(?:m|frac|eigen|math|const)_)?pi(?:_([24]))?")
-_INDEX = re.compile(r"[(\[]\s*(\d+)\s*[)\]]\s*")
+_INDEX = re.compile(r"[(\[]\s*(\d+)\s*(?:,\s*[01]\s*)?[)\]]\s*")
 _NONE = "is not a number or an expression"
 _SIGNS = str.maketrans("−–—﹣∗⋅·×∕÷º˚∘◦⍺", "----****//°°°°α")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")

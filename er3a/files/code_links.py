@@ -8,7 +8,7 @@ from er3a.by_value import frozen
 from er3a.files.arithmetic import words_of
 from er3a.files.code_brackets import CodeGroup, parts
 from er3a.files.code_lists import Lists
-from er3a.files.column_order import parameters_of, signatures
+from er3a.files.column_order import KDL, parameters_of, signatures
 from er3a.files.program_text import Cells, Code, is_row, record_of, row_cells
 from er3a.files.table_cells import Grid, Words
 from er3a.files.table_headings import heading_of, quantities_of
@@ -40,7 +40,7 @@ def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row, and records
     ``{"a": 0, "alpha": 90, ...}``, such calls of other functions; and the lists, of which they take elements."""
     rows, own, unread = list[_Link](), list[_Link](), list[CodeGroup]()
-    records = [_Link("", each.start, record_of(each)) for each in code.groups if each.bracket == "{"]
+    records = _records(code)
     lists = Lists(code)
     for each in code.groups:
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
@@ -48,21 +48,21 @@ def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
             continue
         target, function = named.groups()
         order, toolbox = signatures(code).get(function, []), _TOOLBOX.fullmatch(function)
-        of_lists = toolbox or function == "DH"
+        of_lists = toolbox or function in KDL
         texts = lists.written_out(each) if of_lists or order else [each.inside]
         if function == "DHLink" and "OriginLink(" in code.text:  # ikpy's turns by its theta and the joint's angle
             texts = [re.sub(_ADDED_THETA, r"\1offset", text) for text in texts]
         if of_lists and not texts:
             code.refuse(each.start, each.inside, *_OF_LOOP)
         made = [_arguments(function, text) or _of_signature(order, text) for text in texts]
-        made = [cells for cells in made if cells and (toolbox or _says_numbers(code, cells, target))]
+        made = [cells for cells in made if cells and (toolbox or _says_numbers(lists, cells, target))]
         target = _target(each, target or "", bool(toolbox) and len(texts) == 1)
         for k, cells in enumerate(made):
             name = f"{target}.{k}" if target and len(made) > 1 else target
             (own if order and not of_lists else rows).append(_Link(name, each.start, cells))
         if toolbox and not (made or order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
             unread.append(each)
-    if "Frame::DH(" in code.text:
+    if "Frame::DH" in code.text:
         _segments(code, rows)
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
         code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
@@ -72,14 +72,28 @@ def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
     if rows and (re.search(_ADDED, code.text) or len(rows) == 1 or len({*lists.loops}) < len(lists.loops)):
         code.refuse(rows[0].place, ", ".join(_constants(rows[0].cells)), *_OF_LOOP)
     if not lists.taken:
-        rows = sorted([*rows, *(row for row in records if is_row(row.cells))], key=lambda row: row.place)
+        rows = sorted(rows + records, key=lambda row: row.place)
     grids = [_grid([(code.line(row.place), row.cells) for row in each]) for each in (*_arms(code, rows), own)]
     return grids[:-1], grids[-1:] if len(own) > 1 else [], lists
 
 
+def _records(code: Code) -> list[_Link]:
+    """Records ``{"a": 0, "alpha": 90, ...}``; those next to them in a list may leave out what is 0."""
+    found = [(each, record_of(each)) for each in code.groups if each.bracket == "{"]
+    around = [[other.start for other in code.groups if other.start < each.start < other.end] for each, _ in found]
+    lists = {tuple(places) for places, (_, cells) in zip(around, found) if is_row(cells)} - {()}
+    records = list[_Link]()
+    for places, (each, cells) in zip(around, found):
+        names = quantities_of(cells)
+        if is_row(cells) or (names and len(names) == len(cells) and tuple(places) in lists):
+            blank = {name: "0" for name in ("a", "alpha", "d") if name not in names}
+            records.append(_Link("", each.start, blank | cells))
+    return records
+
+
 def _target(call: CodeGroup, name: str, named: bool) -> str:
     """The name of a link, with the list that it is appended to or put in; ``named``: whether it may have its own."""
-    added = re.search(r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", call.before, re.S)
+    added = re.search(r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\(\s*[^;\n]*\n?[^;\n]*$", call.before, re.S)
     name = f"{added[1]}[{call.start}" if added else re.sub(r"\s", "", name)
     return "" if name.isidentifier() and not named else name
 
@@ -91,31 +105,51 @@ def _arms(code: Code, rows: list[_Link]) -> list[list[_Link]]:
     arms = [[names[cell] for cell in cells] for cells in chosen if len(cells) > 1 and {*cells} <= {*names}]
     taken = [row for each in arms for row in each]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups]
-    for one in [each for each in held if len(each) > 1] or [rows]:
+    several = [] if "Frame::DH" in code.text else [each for each in held if len(each) > 1]
+    for one in several or [rows]:
         arms += [each for each in _begun_again(one) if not taken or (_list_of(each[0]) and each[0] not in taken)]
     return arms
 
 
 def _segments(code: Code, rows: list[_Link]) -> None:
-    """Say what moves in KDL's ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``: its joint comes first."""
+    """Say what moves in KDL's ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``: its joint comes first.
+
+    Of Craig's frames the joint's row is that of the segment before, and the last one is the flange's.
+    """
     joints = dict(re.findall(r"\bJoint\s+(\w+)\s*[({=]([^;\n]*)", code.text))
+    craig = "DH_Craig" in code.text
+    chains = dict[str, tuple[Words, list[_Link]]]()
     for each in code.groups:
         if re.search(r"\bSegment\s*$", each.before):
             said = " ".join(joints.get(part, part) for part in parts(each.inside))
             own = [row for row in rows if each.start < row.place < each.end]
-            kinds = [kind for kind in _KDL if re.search(rf"\b{kind}\b", said)]
-            if not own or len(kinds) != 1:
+            found = [kind for kind in _KINDS if re.search(rf"\b{kind}\b", said)]
+            chain = _target(each, "", False).partition("[")[0]
+            kinds, frames = chains.setdefault(chain, ([], []))
+            if len(found) != 1 or len(frames) < len(kinds) or not (own or craig):
                 code.refuse(
                     each.start,
                     each.inside,
                     "is no row of a table",
                     "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out",
                 )
-            for row in own:
-                row.cells.update(type=_KDL[kinds[0]], convention="standard")
+            passes = [row for row in own if row.place == own[0].place]  # another frame is of the inertia
+            kinds += [_KINDS[found[0]]] * max(len(passes), 1)
+            frames += [_Link(f"{chain}[{len(kinds)}.{k}", row.place, row.cells) for k, row in enumerate(passes)]
+    rows.clear()
+    for chain, (kinds, frames) in chains.items():
+        if not frames:
+            continue
+        zero = _Link(f"{chain}[", frames[0].place, dict.fromkeys(frames[0].cells, "0"))
+        if len(frames) < len(kinds):
+            frames[-1].cells["last frame"] = ""
+        frames = [zero, *frames] if craig else frames
+        rows += frames
+        for row, kind in zip(frames, [*kinds, "fixed"]):
+            row.cells.update(type=kind, convention="modified" if craig else "standard")
 
 
-_KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
+_KINDS = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
 
 
 def _of_signature(order: Words, text: str) -> Cells:
@@ -124,9 +158,9 @@ def _of_signature(order: Words, text: str) -> Cells:
     return {} if len(cells) < len(order) or parameters_of(text) == order else cells
 
 
-def _says_numbers(code: Code, cells: Cells, target: str | None) -> bool:
+def _says_numbers(lists: Lists, cells: Cells, target: str | None) -> bool:
     """Whether a row holds numbers or names of numbers, and no elements of lists; no model of elements ``L(1)``, ..."""
-    texts = _constants(cells)
+    texts, code = [cell for cell in _constants(cells) if cell not in lists.values], lists.code
     if target and f"{target}(1)" in code.text:
         return False
     return not any(re.search(r"\[(?!\d+\])|\w(?<!2)\(\w+\s*,\s*\w+\)|\bc\(", cell) for cell in texts) and any(

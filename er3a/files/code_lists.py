@@ -68,7 +68,7 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
     columns: dict[str, NamedList] = {}  # heading, cells, line, the list's name
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s?)|s)$", "", name.strip("_"))
-        names = (name, re.sub(r"^t\d?$", "theta", bare), bare.rpartition("_")[2])
+        names = (name, re.sub(r"^t$", "theta", bare), bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
         quantity = heading.quantity if heading else name
         if quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
@@ -138,14 +138,14 @@ _SUMMED = (
 """A list that is added to values of joints, as a whole or one by one."""
 
 
-_OF_VECTORS = words_of("a alpha d theta offset type direction pose")
+_OF_VECTORS = words_of("a alpha beta d theta offset type direction pose")
 
 
 _NUMBERED = re.compile(
     r"""
     (?<![\w."'])(?P<quote>["'])?(?:DH_)?
     (?P<name>al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)
-    (?P<bracket>[_({\[]*)(?P<number>\d{1,2})[)}\]]*(?(quote)(?P=quote))   # a1, "a1", a_{1}, a(1)
+    (?P<bracket>[_({\[]*)(?P<number>\d{1,2})(?:,1)?[)}\]]*(?(quote)(?P=quote))   # a1, "a1", a_{1}, a(1)
     \s*(?P<mark>[:=])(?!=)\s*
     (?!(?:\w+\.)?symbols?\()                                             # a symbol of SymPy is no value
     (?P<value>[^,}\n;:=!\s\[{](?:::|[^,}\n;:=!])*)                       # C++'s std::numbers::pi is one
@@ -166,7 +166,7 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
     spellings: dict[str, dict[str, dict[int, tuple[str, str, int]]]] = {}  # value, mark and place of each number
-    text = re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text)
+    text = re.sub(r"(?i)\b(?:DH_|\w+[(\[])(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=(?!=)", r"\2\1:", code.text)  # dh(1).alpha =
     text = re.sub(r"(\w+)\((\d\d?):(\d\d?)\)\s*=\s*([-\d.]+)(?=\s*[;\n])", _each_of_range, text)
     fields = re.findall(r"(?m)^\s*(\w+\.)(?:a|d|alpha|theta|offset)\(\d+\)\s*=", text)
     text = text.replace(fields[0], "") if len({*fields}) == 1 else text  # of one record: dh.alpha(1) = pi
@@ -182,7 +182,7 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
     if any(mark == ":" for _, mark, _ in found.get("q", {}).values()):
         found.pop("theta", None)  # what the program computes for a pose
     quantities = dict(zip(quantities_of(found), found.values()))
-    lines = code.text.split("\n") if len(found) == 3 and "DH_A" not in code.text else []
+    lines = code.text.split("\n") if len(found) == 3 else []
     for used in _USED.finditer("\n".join(lines)):
         if used[0][0] not in "[(,;" or not _VARIABLE.search(lines[code.line(used.start()) - 1]):
             code.refuse(used.start(), used[0], "is no column of a table", "Write a list of theta or offset")
@@ -251,7 +251,7 @@ class Lists:
         self.code, self.taken, self.loops = code, set[str](), Words()
         self.said = re.search(_LANGUAGE, code.text)  # what counts from 0 or, as Julia, from 1
         self.first = int(bool(self.said and "end" in self.said[0]))
-        joints = () if "Frame::DH(" in code.text else ["theta"]  # which KDL has as a constant
+        joints = () if "Frame::DH" in code.text else ["theta"]  # which KDL has as a constant
         lists = (each for each in named_lists(code) if each[1] and quantities_of(each[:1]) != joints)
         self.values: dict[str, Any] = {name: cells for name, cells, _, _ in lists}
         for group in code.groups:

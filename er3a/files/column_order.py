@@ -120,6 +120,9 @@ def names_columns(names: Words, *, once: bool = False) -> bool:
     return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
 
 
+KDL = "DH", "DH_Craig1989"
+
+
 _OF_ROWS = re.compile(r"\w*(?:dh|denavit|link|trans|frame)\w*|[AT]", re.I)
 """Names of functions of a row, whose order a comment may say."""
 
@@ -129,7 +132,7 @@ def signatures(code: Code) -> dict[str, Words]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
     # KDL's joint comes before the frame, whose theta is a constant, whatever its name.
-    orders = {"DH": ["a", "alpha", "d", "offset"]} if "Frame::DH(" in code.text else {}
+    orders = {name: ["a", "alpha", "d", "offset"] for name in KDL if "Frame::DH" in code.text}
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), parameters_of(each.inside)
         line = code.line(each.start)

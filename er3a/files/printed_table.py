@@ -8,10 +8,12 @@ ways is refused, with both.
 from __future__ import annotations
 
 import html
+import json
 import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -25,7 +27,7 @@ from er3a.files.column_order import LIBRARIES, program
 from er3a.files.csv_file import Lines
 from er3a.files.program_text import Cells, Code
 from er3a.files.table_cells import MARKS, Grid, Words, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import COUPLED, code_grids
+from er3a.files.table_code import code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -53,7 +55,6 @@ _CELL = (
 _STARRED = re.compile(r"^\*$|\w\^?\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
 _NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
-_BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
 _KINDS = words_of(
     "r=revolute 0=revolute rot=revolute rotational=revolute rotary=revolute 旋转=revolute "
     "p=prismatic 1=prismatic linear=prismatic 移动=prismatic"
@@ -182,6 +183,9 @@ def printed_table(
     InputError
         naming line and cell: for two tables, for what can be read in two ways, and for what can't be read
     """
+    if '"cell_type"' in text:
+        with suppress(ValueError, KeyError, TypeError):  # a notebook, if it is whole
+            text = "\n\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"])
     text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)(?:\(\w+\))?[ \t]+(.+)$", r"\1 = \2;", text)
     text = re.sub(r"&#?\w+;", lambda found: html.unescape(found[0]), text)
     if not re.search(r"(?m)^[ \t]*(?![#%]|//)\S", text):  # all of it is a comment
@@ -436,8 +440,6 @@ class _Table:
         placed = r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)" if from_code else r"\b(?:base|tool)\W+t\s*="
         if re.search(placed, text):
             self.notes.append("base and tool of the text are not read")
-        if from_code and (coupled := COUPLED.search(self.text)):
-            self.notes.append(f"'{coupled[0]}' is not read: joints are taken to turn by themselves")
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.lengths = self._said_unit(text)
         self.kinds = self._kinds(text)
@@ -486,7 +488,7 @@ class _Table:
         if {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")} == {True}:
             self.notes.append("a and alpha of the link before the joint (i-1): read as modified D-H (Craig)")
             return "modified"
-        near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0] + 3])
+        near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0]])
         library = {each for library, (_, each) in LIBRARIES.items() if each and re.search(library, text)}
         library |= code.conventions if code else set()
         for part in (code.text if code else "", near, text):
@@ -656,14 +658,6 @@ class _Table:
                 kind = "revolute"
             elif slides[row] and (starred[row] or any(turns)):
                 kind = "prismatic"
-            said = _BY_NAME.search(name)
-            if said and ("p" in said[1]) != (kind == "prismatic"):
-                self._refuse(
-                    row,
-                    self.column["joint"],
-                    f"'{name}' is {_KINDS[said[1]]} by its name, and {kind} by its variable",
-                    "Write the variable into theta or d",
-                )
             found.append(kind)
         if found.count("fixed") > max(2, len(found) // 2):
             self._refuse(
@@ -780,10 +774,6 @@ class _Table:
         units = sorted({each.unit for each in found if each and each.unit and each.number}) or self.lengths * length
         bare = max((abs(each.number) for each in found if each and not each.unit), default=0.0)
         unit = self.headings[k].unit or (units[0] if len(units) == 1 else "")
-        if unit == "grad":
-            if any(each and each.number % 90 for each in found):
-                self._refuse(None, k, "grad may be degrees or gons", "Name the column's unit deg, or convert it")
-            unit = "deg"
         if not unit and not units and not length and bare < RADIANS_BELOW_DEG and self._has_radians():
             unit = "rad"
         if bare and ((len(units) > 1 and not unit) or (unit == "rad" and units and bare > 2 * math.pi)):

@@ -47,13 +47,6 @@ _TYPE = re.compile(rf"(?:struct|class)\s+(\w*)[^{{}}\n]*\s*[{{:]?\s*(?:(?:{_FIEL
 """A type whose fields are numbers: in C its name may follow."""
 
 
-_ENTRY = re.compile(
-    r"(?m)(^|;)[ \t]*(\w+)(?:\.at<\w+>)?[\[({](\d+)(?:[\])}]?[\[({.,]\s*)+[\"']?(\w+)"
-    r"[\"']?[\])}]?[ \t]*=(?!=)[ \t]*([^;\n]+)"
-)
-"""A statement that fills an entry of a matrix, or of a list of records."""
-
-
 class Code:
     """A program: its text without comments, these and docstrings by their lines, and the fields of its types by their
     names; its brackets in the order of their beginnings; and the conventions that it says.
@@ -74,7 +67,6 @@ class Code:
         self.text = _COMMENT.sub(kept, text)
         for pattern, plainly in _AS_RECORDS:
             self.text = re.sub(pattern, plainly, self.text)
-        self.text = _entry_by_entry(self.text)
         self.fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(self.text)}
         self.groups = sorted(groups_of(self.text), key=lambda each: each.start)
 
@@ -85,21 +77,6 @@ class Code:
     def refuse(self, place: int, text: str, problem: str, remedy: str) -> NoReturn:
         """Refuse a passage, which is quoted."""
         raise InputError(None, f"line {self.line(place)}", f"'{' '.join(text.split())[:60]}' {problem}", remedy)
-
-
-def _entry_by_entry(text: str) -> str:
-    """A text whose statements ``T[0][1] = ...``, ``DH(1).a = ...`` are one that has all entries."""
-    found, whole = dict[str, dict[int, Cells]](), Cells()
-    for _, name, row, key, value in _ENTRY.findall(text):
-        found.setdefault(name, {}).setdefault(int(row), {})[key] = value.strip()
-    for name, rows in found.items():
-        made = [row if is_row(row) else [*row.values()] for _, row in sorted(rows.items())]
-        of_numbers = all("".join(row).isdigit() and [*row] == sorted(row) for row in rows.values())
-        same = len({*map(len, made)}) == 1 and len(made[0]) > 2 and (of_numbers or all(map(is_row, rows.values())))
-        if same and 1 < len(rows) == max(rows) - min(rows) + 1:
-            whole[name] = f"{name} = {made}".replace("'", "")
-    first = dict(whole)
-    return _ENTRY.sub(lambda each: each[1] + first.pop(each[2], "") if each[2] in whole else each[0], text)
 
 
 def row_cells(text: str) -> Words:

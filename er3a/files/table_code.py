@@ -38,9 +38,8 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
         for group in code.groups:
             _check_kept(code, group, bool(named or lists.taken), lists.taken)
     of_types = links and "type" in links[0][0][1]
-    for moved in re.finditer(_TURNED, code.text) if found and not of_types else ():
-        if not COUPLED.fullmatch(moved[0].strip(" ;\n")):
-            code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
+    if found and not of_types and (moved := re.search(_TURNED, code.text)):
+        code.refuse(moved.end(), moved[0], "changes theta", "Write its offset into the table")
     return [[(line, _shown(lists, table[0][1], row)) for line, row in table] for table in found]
 
 
@@ -68,53 +67,36 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool, taken: set[str]) 
     of_column = not is_matrix and _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
     if (name not in taken if taken else not (table or of_column)) or not group.inside.strip():
         return
+    titles, *rows = [row for _, row in table] or [[]]
+    thetas = [cell for row in rows for title, cell in zip(titles, row) if quantities_of([title]) == ["theta"]]
+    # Joints' values are added to constants of theta, or put there if these are 0.
+    joints = (
+        r"\+=?\s*(?:q|th|θ|joint)" if re.search(r"(?i)(?<!\w)[\d.]*[1-9]|pi|π", " ".join(thetas)) else "q|th|θ|joint"
+    )
     used = {*re.findall(rf"\b{name}[\[(]\d+,\s*:", code.text)}
     if is_matrix and 0 < len(used) < len(rows_of(code, group)):
         code.refuse(group.start, name, "has rows that the program does not use", "Leave them out")
-    changes = [each for each in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(each, name, table)]
-    for change in [*_MOVED.finditer(group.before), *changes]:
-        place = change.end() if change in changes else group.start
+    of_name = _SET.replace("NAME", name).replace("JOINTS", joints)
+    for change in [*_MOVED.finditer(group.before), *re.finditer(of_name, code.text)]:
+        place = group.start if change.re is _MOVED else change.end()
         code.refuse(place, change[0].strip(" ;"), f"changes '{name}'", "Write what the program makes of it")
 
 
-def _puts_in(found: re.Match[str], name: str, table: Grid) -> bool:
-    """Whether a statement changes a list: values of joints, which have no numbers, may be added to theta, or put there
-    if it is 0, and a list may be converted as a whole, ``DH = np.radians(DH)``."""
-    place, sign, given = found.groups()
-    value = re.sub(r"[\[(][\w:, +-]*[\])]", "", given or "")  # without indices
-    own = re.search(rf"(?<![\w.]){name}\b", value)
-    if not place:
-        return given is None or bool(own and not _CONVERTED.match(given))
-    names = [each for _, header in table[:1] for each in header if each != "joint"]
-    last = re.findall(r"\w+", place)[-1]
-    column = dict(enumerate(names, "(" in place)).get(int(last), "") if last.isdigit() else last
-    cells = " ".join(cell for _, row in table for title, cell in zip(table[0][1], row) if title == column)
-    added = sign == "+" or (not sign and (own or not re.search(r"(?i)(?<!\w)[\d.]*[1-9]|pi|π", cells)))
-    return place_of(column) != "theta" or not added or bool(re.search(r"-|(?<!\w)\d|[\[{]", value))
-
-
 _SET = r"""(?mx)
-    (?:(?<![(,]\n)(?<![(,]\r\n)^|;)[ \t]*                  # where a statement begins, and no argument
-    (?:del[ \t]+NAME\b
+    (?<![(,]\n)(?<![(,]\r\n)^[ \t]*(?:del[ \t]+NAME\b                              # no argument on its own line
     |NAME(?:\.(?:append|insert|extend|pop|reverse)\(
-    |[ \t]*((?:\.\w+|[\[({][^\n=\])}]*[\])}])*)[ \t]*      # the place in it: NAME[0][1], NAME(1).a
-    ([-+*/]?)=(?!=)([^\n;]*)))                             # += or =, and the value
+    |(?:\.\w+|[\[({][^\n=\])}]*[\])}])*[ \t]*-=                                    # NAME[1][0] -= q[1]
+    |(?:\.\w+|[\[({][^\n=\])}]*[\])}])+(?!.*(?:JOINTS))[ \t]*[+*/]?=(?!=)[^\n;]*
+    |[ \t]*[+*/]?=(?!=)[ \t]*(?!(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\()[^\n;]*\bNAME\b.*))
 """
-"""A statement that puts something into a list, or gives its name to something else; no argument
-``d=d[j]`` on a line of its own."""
-
-
-_CONVERTED = re.compile(r"\s*(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\(", re.I)
+"""A statement that puts something else than joints' values into a list, changes its length, or makes it anew of itself,
+in the same units."""
 
 
 _TURNED = (
     r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*)?[-+].*(?:pi|\d).*|"
     r"^\s*((?:q|th|theta)\w*)\s*=\s*(?:\1|(?:q|th|theta)[a-z_]*)\s*[-+].*(?:pi\b|90|180).*"
 )
-
-
-COUPLED = re.compile(r"((?:q|th|theta)\w*[\[(]\d[\])])\s*=\s*\1\s*[-+]\s*(?:q|th|theta)\w*[\[(]\d[\])]")
-"""Of a joint that turns with another one, as parallel links make it."""
 
 
 _MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)

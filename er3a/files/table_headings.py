@@ -66,7 +66,7 @@ def heading_of(text: str) -> Heading | None:
         return None
     short = re.sub(r"<[^>]*>|[\s{}\\\"'`$^]", "", plain(text).lower())
     said = [each for each in _UNIT.findall(short) if each in UNITS]
-    unit = said[0] if said == ["grad"] else UNITS[said[0]] if said else ""
+    unit = UNITS[said[0]] if said else ""
     name = re.sub(r"_(mm|cm|m|in|deg|rad)$", "", short)
     # Without the index, which says only whether the entry belongs to the joint or to the link before it.
     name = re.sub(r"[(\[](?!offset|\d)[^()\[\]]*[)\]]|/.*|,(?!offset).*", "", name)

@@ -316,7 +316,6 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("a,alpha,d\n0.1,90,0.06\n2.61,0,0.1\n", "say no unit"),  # metres, or inches
         ("a,alpha,d\n300,1.05,0\n200,0,0\n", "--angle-unit"),
         ("a,alpha,d,type\n300,90,0,1\n200,0,0,1\n", "turns"),
-        ("a (mm),alpha (grad),d (mm)\n300,100,0\n200,0,0\n", "gons"),
         (
             "# a, alpha, d, theta\nM = [[0, 0.3, 0, 1], [0, 0, 0.2, 1]]\nfor theta, d, a, alpha in M:\n",
             "the program theta",
@@ -419,14 +418,13 @@ def test_centimetres_that_the_text_says_are_no_millimetres(tmp_path, said, longe
     assert content.dh.rows[1].a_mm == pytest.approx(longest)
 
 
-def test_a_flange_of_zeros_and_a_coupling_are_no_rows(tmp_path):
+def test_a_flange_of_zeros_is_no_row_and_a_coupling_is_asked_back(tmp_path):
     text = "alpha0 = 0; a0 = 0; d1 = 290; offset1 = 0;\nalpha1 = -90; a1 = 50; d2 = 0; offset2 = -90;\n"
     content, _ = read(tmp_path, f"{text}alpha2 = 0; a2 = 0;\n")
     assert numbers(content) == [(0, 0, 290, 0), (50, -90, 0, -90)]
     lists = "a = [0, 0.27];\nalpha = [-pi/2, 0];\nd = [0.29, 0];\noffset = [0, -pi/2];\n"
-    content, notes = read(tmp_path, f"{lists}q(2) = q(2) - q(1);\n")
-    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
-    assert any("q(2) = q(2) - q(1)" in note for note in notes)
+    with pytest.raises(InputError, match="changes theta"):
+        read(tmp_path, f"{lists}q(2) = q(2) - q(1);\n")
     with pytest.raises(InputError, match="different numbers"):
         read(tmp_path, f"{text}alpha2 = 0; a2 = 40;\n")
 
@@ -852,6 +850,50 @@ def test_joints_of_kdl_slide_or_are_fixed_as_their_segments_say(tmp_path):
     assert content.base.xyz_mm[2] == pytest.approx(100)
 
 
+def test_a_segment_of_kdl_has_the_next_joints_row_of_craig(tmp_path):
+    segment = "c.addSegment(\n  Segment(Joint(Joint::{}), Frame::DH_Craig1989({})));\n"
+    other = "c.addSegment(Segment(Joint(Joint::None), H));\n"
+    joints = segment.format("RotZ", "0.1, M_PI_2, 0, 0") + segment.format("TransZ", "0, 0, 0.2, M_PI_2")
+    content, _ = read(tmp_path, joints)
+    rows = [(row.type, row.a_mm, round(row.alpha_deg), row.d_mm) for row in content.dh.rows]
+    assert (content.dh.convention, rows) == ("modified", [("revolute", 0, 0, 0), ("prismatic", 100, 90, 0)])
+    np.testing.assert_allclose([content.flange.xyz_mm, content.flange.rpy_deg], [(0, 0, 200), (0, 0, 90)], atol=1e-9)
+    content, notes = read(tmp_path, segment.format("None", "0, 0, 0.3, 0") + joints + other)
+    assert [row.d_mm for row in content.dh.rows] == [300, 0]
+    assert any("last frame" in note for note in notes)
+    with pytest.raises(InputError, match="no row of a table"):
+        read(
+            tmp_path,
+            segment.format("RotZ", "0, 0, 0.3, 0") + other + joints,
+        )
+
+
+def test_records_leave_out_what_is_zero(tmp_path):
+    rows = "{ alpha: 1.5708, d: 290 }, { a: 270 }, { d: 72, alpha: 0 }"
+    content, _ = read(tmp_path, f"const arm = {{ colour: {{ a: 1 }}, dh: [{rows}] }};\n")
+    found = [(row.a_mm, row.alpha_deg, row.d_mm) for row in content.dh.rows]
+    np.testing.assert_allclose(found, [(0, 90, 290), (270, 0, 0), (0, 0, 72)], atol=1e-3)
+
+
+def test_a_notebook_is_the_text_of_its_cells(tmp_path):
+    matrix = "# theta, d, a, alpha\nT = [[q1, 290, 0, -pi/2],\n [q2 - pi/2, 0, 270, 0]]\n"
+    cells = [{"cell_type": "code", "source": matrix.splitlines(keepends=True), "outputs": [[1, 2, 3, 4], [5, 6, 7, 8]]}]
+    content, _ = read(tmp_path, json.dumps({"cells": cells}))
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+def test_a_call_that_takes_lists_is_no_row(tmp_path):
+    lists = "a = np.array([0, 270.0])\nalpha = np.array(\n [-pi/2, 0])\nd = [290, 0]\noffset = [0, -pi/2]\n"
+    content, _ = read(tmp_path, lists + "arm = Arm(a=a, alpha=alpha, d=d, offset=offset)\n")
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+    columns = "".join(f"a({k},1) = {a};\nd({k},1) = {d};\nalpha({k},1) = {alpha};\n" for k, a, d, alpha in COLUMN)
+    content, _ = read(tmp_path, columns + "theta(1,1) = q(1);\ntheta(2,1) = q(2)-pi/2;\n")
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+COLUMN = (1, 0, 290, "-pi/2"), (2, 270, 0, "0")
+
+
 LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
 
 
@@ -1158,3 +1200,8 @@ def test_base_and_tool_below_a_printed_table_are_named(tmp_path):
     _, notes = read(tmp_path, printed + "\n│base │ t = 0, 0, 0; rpy/xyz = 0°, 90°, 0° │")
     assert [note for note in notes if "base" in note] != []
     assert [note for note in read(tmp_path, printed)[1] if "base" in note] == []
+
+
+def test_a_list_of_turns_about_y_is_no_list_to_leave_out(tmp_path):
+    lists = "a = [0, 270]\nalpha = [-90, 0]\nd = [290, 0]\nbeta = [0, 0.5]\n"
+    assert [row.beta_deg for row in read(tmp_path, lists)[0].dh.rows] == [0, 0.5]
