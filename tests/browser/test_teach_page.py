@@ -102,7 +102,7 @@ class Panel:
             const walker = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
             const texts = [...document.querySelectorAll("main [aria-label]")].map((e) => e.ariaLabel);
             while (walker.nextNode()) {
-              if (walker.currentNode.parentNode.localName !== "script") texts.push(walker.currentNode.data.trim());
+              if (!walker.currentNode.parentNode.closest("script, .chip")) texts.push(walker.currentNode.data.trim());
             }
             return texts;"""
         )

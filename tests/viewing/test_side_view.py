@@ -30,14 +30,16 @@ def test_what_a_wrong_arm_reaches_does_not_make_the_arms_small():
 
 def test_the_floor_is_named_and_below_the_arm():
     drawn = side_view([SeenArm("", "", "right", ARM, [RING])], 0.0, ratio=2.0)
-    assert drawn.count("floor</span>") == 1
+    assert drawn.count("floor</text>") == 1
     assert '<rect class="floor"' in drawn
 
 
 def test_the_word_of_a_line_is_near_it_where_the_arm_is_not():
     upright = SeenArm("", "", "right", np.array([[0.0, 0.0], [50.0, 0.0], [50.0, 400.0]]))
     around = DrawnLine(np.array([[30.0, 0.0], [50.0, 20.0], [70.0, 0.0]]), "turn", "direction2", "J2")
-    (x, y) = re.search(r'<text x="(-?\d+)" y="(-?\d+)"', side_view([upright], ratio=0.8, over=[around])).groups()
+    (x, y) = re.search(
+        r'<text class="" x="(-?\d+)" y="(-?\d+)"', side_view([upright], ratio=0.8, over=[around])
+    ).groups()
     assert int(x) > 70
     assert np.hypot(int(x) - 50, int(y)) < 80
 

@@ -168,7 +168,7 @@ def payload_key(summary: Summary | None, robot: Robot) -> tuple[str, str]:
     wrist = robot.masses.wrist
     if wrist is not None and np.isfinite(wrist.payload):
         return with_unit(f"{wrist.payload:.3g}", "kg"), tr("rated at the flange, not examined")
-    return tr("▲ mount nothing"), tr("payload unknown")
+    return tr("mount nothing"), tr("payload unknown")
 
 
 def payload_text(summary: Summary | None, robot: Robot) -> str:

@@ -17,13 +17,13 @@ CHECKS: Mapping[Check, str] = words(
         "round_trips": "round trips",
         "limits": "joint limits",
         "reach": "reach",
-        "rates": "speeds and accelerations",
+        "rates": "speeds, accelerations",
         "singularity": "singularities",
         "self_collision": "self-collision",
-        "scene_collision": "collisions with the scene",
+        "scene_collision": "scene collision",
         "torque": "torques",
         "camera": "camera",
-        "program_lines": "lines of programs",
+        "program_lines": "program lines",
         "units": "units",
     }
 )

@@ -22,7 +22,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import ListRow, Mark
 
 Results = Mapping[str, Stored[Any]]
-FEW = 7  # rows of a tile: so many are seen whole on the first screen
+FEW = 10  # rows of a tile: so many are seen whole on the first screen
 LETTERS = 0.14  # of the reach, in the small view from above
 
 
@@ -30,8 +30,8 @@ LETTERS = 0.14  # of the reach, in the small view from above
 class Tile:
     """An answer, which leads to its page, and its picture.
 
-    ``asked``: what it answers, by ``answer``, in the colour of ``mark``, and what is ``good``. ``entries``,
-    the first ``rows`` of ``all`` below a ``heading``, ``drawing`` with ``keys``: what is shown, one of them.
+    ``asked``: what it answers, by ``answer``, in the colour of ``mark``. ``entries``, the first ``rows`` of ``all``
+    below a ``heading``, ``drawing`` with ``keys``: what is shown, one of them.
     """
 
     asked: str
@@ -42,7 +42,6 @@ class Tile:
     rows: Sequence[ListRow] = ()
     all: int = 0
     heading: str = ""
-    good: Sequence[ListRow] = ()
     drawing: str = ""
     keys: Sequence[tuple[str, str]] = ()
 
@@ -75,7 +74,7 @@ def table_tile(name: str, stored: Results) -> Tile | None:
 
 
 def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
-    """Which paths or programs of a robot pass, by name, and the others, each with its bar over time.
+    """How many paths or programs of a robot pass, and the others, each with its bar over time.
 
     Parameters
     ----------
@@ -87,11 +86,10 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     said = answer(study.robot(name), results)
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
-    good = [row for row in rows if row.mark == "pass" and row.play]
     others = [row for row in rows if row.mark != "pass"]
     page = f"{name}/{found.stage}.html"
     asked = tr("Which {what} pass?", what=what)
-    return Tile(asked, said.headline, sound, page, rows=others[:FEW], all=len(others), heading=said.rest, good=good)
+    return Tile(asked, said.headline, sound, page, rows=others[:FEW], all=len(others), heading=said.rest)
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:

@@ -197,7 +197,7 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
     """What to do about the first fault that can be mended; None where none can."""
     for fault in faults:
         if fault.to_do:
-            place = fault.instead[1] if fault.instead else fault.address * (fault.status == "caution")
+            place = fault.instead[1] if fault.instead else ""
             text = re.sub(r"(?<=\d) (?=(mm|s|%))", "\u00a0", first_sentence(fault.to_do)[0])  # units stay with values
             return Fix(text, place, fault.status != "caution")
     return None

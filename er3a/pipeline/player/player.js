@@ -15,6 +15,7 @@ const [FAINT, SEEN_THROUGH] = [0.15, 0.5]; // of a body that hides the arm or is
 const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
 const SLOW = 60; // ms between two frames: the next ones have fewer pixels
+const SHORT = 16; // px: a shorter gap is shown larger as well
 const CLOSED = 0.02; // of the arm's size: a motion ends where it starts
 const ROUNDED = 1e-4; // s, of the times that a motion has
 
@@ -117,8 +118,8 @@ function draw() {
   space.begin();
   const { offsetLeft, offsetTop, offsetWidth, offsetHeight } = nowShown; // words keep off what is said there
   space.taken.push([offsetLeft + offsetWidth / 2, offsetTop + offsetHeight / 2, offsetWidth, offsetHeight]);
-  space.floor(column(table.base, 3), data.size / 10, floor);
   const wrong = unjudged && arms.length > 1 && new Map(poses[0].map((_, j) => [j ? `link_${j}` : "base", data.colours.touching]));
+  space.floor(column(table.base, 3), data.size / 10, floor, Boolean(wrong));
   arms.forEach(({ shown }, k) => shown.show(poses[k], (k === 0 && wrong) || colours, part("looks")?.value, Boolean(wrong && k === 0)));
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
   const others = wrong ? [] : motion.ghosts.map((q) => posesOf(arms[0], q));
@@ -132,7 +133,7 @@ function draw() {
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && (touching.has(mesh.shape.name) ? SEEN_THROUGH : FAINT));
   const moves = motion.trails[0].some((point) => Math.hypot(...subtract(point, motion.trails[0][0])) >= CLOSED * data.size);
-  for (const trail of moves ? motion.trails : []) space.line(trail, wrong ? (trail === motion.trails[0] ? page.touching : page.accent) : page.ink, 2);
+  for (const trail of moves ? motion.trails : []) space.line(trail, wrong ? (trail === motion.trails[0] ? page.touching : page.accent) : page.ink, wrong ? 4 : 2);
   for (const { t: from, until, status } of motion.events) {
     if (status === "plain" || from >= Math.min(until, end())) continue;
     const times = [from, ...motion.times.filter((time) => time > from && time < until), Math.min(until, end())];
@@ -156,10 +157,13 @@ function draw() {
   }
   if (motion.loads) tellLoads(poses[0]);
   for (const [j, { status }] of failing()) {
-    if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
+    if (status === worst) space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), { caution: page.doubtful, fail: page.touching }[status] ?? page.ink);
   }
   if (moves && arms.length === 1 && !others.length) nameEnds(motion.trails[0]);
   space.keepClear(motion.trails[0], 0);
+  const pixels = ([x, y], [u, v]) => Math.hypot(u - x, v - y);
+  const gap = marks.find(({ from, to, text }) => text && String(from) !== String(to) && pixels(space.seen(from), space.seen(to)) < SHORT);
+  if (gap && !touching.size && !motion.loads) space.closer(scaled(add(gap.from, gap.to), 0.5));
   for (const { from, to, text } of marks) if (text) space.word(text, scaled(add(from, to), 0.5), css);
   data.signs.forEach(({ text, at }, k) => space.word(text, wrong ? column(poses[k][3], 3) : at, k === 0 && wrong ? page.touching : page.ink));
   space.names(surroundings, touching);
@@ -172,7 +176,7 @@ function sticks(poses, css, shown) {
   const off = joints.filter((joint, k) => Math.hypot(...subtract(joint, column(shown[k], 3))) > CLOSED * data.size);
   if (off.length) space.line(joints, css, 4);
   off.forEach((joint) => space.dot(joint, css, 4.5));
-  space.keepClear(off, DOT * data.size);
+  if (off.length) space.keepClear(alongArm(poses), DOT * data.size);
   const away = (joint) => Math.min(...shown.map((T) => Math.hypot(...subtract(joint, column(T, 3)))));
   return off.length ? off.reduce((a, b) => (away(b) > away(a) ? b : a)) : [];
 }
@@ -250,7 +254,7 @@ function tellJoints() {
     show(cells[i].room, fault?.needed || text.replace("{room}", fixed(Math.abs(rooms[i]), 1)));
     cells[i].place.classList.toggle("least", quiet && least.get(unit) === i);
     cells[i].place.classList.toggle("doubtful", fault?.status === "caution");
-    cells[i].place.classList.toggle("past", past || (fault !== undefined && fault.status !== "caution"));
+    cells[i].place.classList.toggle("past", past || fault?.status === "fail");
     show(ranges[i].nextElementSibling, withUnit(values[i], unit));
     ranges[i].className = cells[i].place.className;
     ranges[i].style.setProperty("--at", rooms[i] === Infinity ? 0.5 : Math.min(1.04, Math.max(-0.04, (values[i] - lower) / (upper - lower || 1))));
@@ -278,10 +282,6 @@ function newMotion() {
     return tick;
   });
   part("ticks").replaceChildren(...ticks);
-  if (arms.length < 2) return; // or else the bar shows how far the tools are from each other, over time
-  const off = motion.trails[0].map((point, k) => Math.hypot(...subtract(point, motion.trails[1][k])));
-  const shades = off.map((far, k) => `color-mix(in srgb, var(--fail) ${(100 * far) / Math.max(...off)}%, var(--line)) ${(100 * motion.times[k]) / end()}%`);
-  part("ticks").style.background = `linear-gradient(to right, ${shades})`;
 }
 
 /** Lays a cursor over each panel of a plot; returns what moves them. */
@@ -292,14 +292,7 @@ function withCursors(figure) {
     figure.append(cursor);
     return { left, bottom, right, top, t0, t1, name, cursor };
   });
-  /** The picture's own edge in the figure: in the middle of its place, less border and padding. */
-  const inner = () => {
-    const style = getComputedStyle(image);
-    const edges = 2 * (parseFloat(style.paddingLeft) + parseFloat(style.borderLeftWidth));
-    const scale = Math.min((image.offsetWidth - edges) / image.naturalWidth, (image.offsetHeight - edges) / image.naturalHeight);
-    const [width, height] = [scale * image.naturalWidth, scale * image.naturalHeight];
-    return { x: image.offsetLeft + (image.offsetWidth - width) / 2, y: image.offsetTop + (image.offsetHeight - height) / 2, width, height };
-  };
+  const inner = () => drawnPart(image, image.offsetLeft, image.offsetTop);
   image.addEventListener("load", refresh);
   image.addEventListener("click", (event) => {
     const { x, y, width, height } = inner();

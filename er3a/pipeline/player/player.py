@@ -40,7 +40,7 @@ MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, an
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
 MARGIN, THICK = 0.04, 0.08  # of the arm's size, around what is to be seen, and around the middle of links
 TITLE = 0.05  # of the picture's height, for what is said over it
-AROUND = 0.3  # of the arm's size, from its way: what bodies have farther off need not be in the picture
+AROUND = 0.4  # of the arm's size, from its way: what bodies have farther off need not be in the picture
 TURNED = 0.25  # rad, by which the eye looks at arms along y from another side
 TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which the arm is seen best
 HIDDEN_COSTS, TURN_COSTS = 1.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
@@ -101,7 +101,7 @@ def player(
         ):  # what nothing is said of is the one before it in another way, and seen alike
             gravest = min(reversed(motion.events), key=lambda event: GRAVEST.index(event.status))
             turned = best_turn(robot, motion, data["opened"][1] if motion is first else gravest.t, data)
-        own |= _frame(data, robots, motion, turned) | {"turned": turned, "elevation": motion.elevation}
+        own |= framed(data, robots, motion, turned) | {"turned": turned, "elevation": motion.elevation}
     data |= {key: own[key] for own in data["motions"] if own["name"] == first.name for key in VIEW}
     return Markup(
         page_environment(_HERE)
@@ -120,7 +120,7 @@ def picture_at(robot: Robot, motion: PlayedMotion, t: float, scene: Scene | None
     """A WebP picture of an arm and its scene at time ``t`` (s) of a motion, as a player would open."""
     data = _data(robot, [motion], scene, (), ()) | {"opened": (motion.name, t)}
     turned = best_turn(robot, motion, t, data)
-    data |= _frame(data, (robot,), motion, turned) | {"turned": turned}
+    data |= framed(data, (robot,), motion, turned) | {"turned": turned}
     return _still((robot,), motion, data).picture()
 
 
@@ -182,7 +182,7 @@ def _corners(shape: Shape) -> Reals:
     return corners
 
 
-def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, turned: float) -> dict[str, Any]:
+def framed(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion, turned: float) -> dict[str, Any]:
     """How much has to be seen (m), and around which point, for the picture to hold the arms on their ways and what is
     around them, as far as that is near; ``turned``, rad: of the eye."""
     points = [poses_at(robots[0], q)[:, :3, 3] for q in motion.ghosts]

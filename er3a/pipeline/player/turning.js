@@ -6,7 +6,6 @@ import three from "er3a/three";
 
 const STEPS = 65535; // that the box is divided into
 const FLOOR = 14; // lines of the floor, along what is seen
-const NEAR = 1.1; // of the distance that all is seen from: where a tray is
 const SIDES = [0.9, 0.5, 1.3, -0.9, -0.5, -1.3, 0.9]; // rad, from which a tray is looked at: the first where nothing hides the arm
 const SPARSE = 20; // one of so many points of a void keeps words off it
 const AWAY = 0.8; // of its opacity what is reachable keeps before a tray
@@ -41,7 +40,7 @@ function face(chosen) {
   const at = placeOf(shown);
   const [[x, y], near] = [subtract(at, middle), Boolean(shown.shapes)];
   const about = Math.hypot(x, y) < 0.1 * size[0]; // axis 1
-  Object.assign(space, { elevation: 0.35, distance: (near || about ? NEAR : 1) * whole, target: near ? scaled(add(at, column(solids[0].poses[0], 3)), 0.5) : middle });
+  Object.assign(space, { elevation: 0.35, distance: whole, target: near ? scaled(add(at, middle), 0.5) : middle });
   for (const turn of near ? SIDES : [0.35]) {
     space.azimuth = about ? data.azimuth : Math.atan2(y, x) + turn;
     space.begin();
@@ -101,7 +100,7 @@ function draw() {
   space.begin();
   space.floor(middle, size[0] / FLOOR, data.floor);
   const near = shown?.shapes;
-  const isSeen = (each) => each.check?.checked ?? (each.shapes ? each === shown : !near);
+  const isSeen = (each) => each.check?.checked ?? (!each.shapes || each === shown);
   const arm = near && shown.reached.length ? shown.reached : solids[0].poses;
   for (const each of all) for (const part of each.parts) part.visible = isSeen(each);
   for (const { material } of layers.flatMap(({ parts }) => parts)) material.opacity = (material.userData.opacity ??= material.opacity) * (near ? AWAY : 1);

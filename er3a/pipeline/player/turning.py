@@ -76,7 +76,7 @@ def surroundings(robot: Robot, scene: Scene | None, ways: Sequence[Any]) -> list
 
 
 AZIMUTH_DEG, ELEVATION_DEG = -52.0, 15.0  # from where a figure is seen at first
-FILLED = 0.3  # of the distance that holds the box's diagonal
+FILLED = 0.315  # of the distance that holds the box's diagonal
 
 
 def turning_figure(

@@ -16,7 +16,6 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.collision.triangles import TriangleTree
 from er3a.files.vision_file import load_vision
 from er3a.finding import fact
-from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import (
     TYPES,
     USUAL_NEAR,
@@ -35,7 +34,7 @@ from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import at_rest
-from er3a.pipeline.player.player import AXES, LOOKS, SPACE, best_turn, drawing_head, table_data
+from er3a.pipeline.player.player import AXES, LOOKS, SPACE, best_turn, drawing_head, framed, table_data
 from er3a.pipeline.results import Provenance, input_records, is_computed, read_foundation
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
@@ -283,6 +282,8 @@ def write_panel(
     opened = rows[(Bodies(robot, scene).free(rows, NEAR_TOUCH) & ~near.contains(robot, rows)).argmax()]
     solids = drawn_scene(scene.solids if scene else (), robot)
     others = [arm for arm in (right,) if arm is not None and arm.joints == robot.joints]
+    seen = {"scene": solids, "size": own["size"]}
+    turned = best_turn(robot, at_rest(robot, "", q=opened), 0.0, seen)
     panel = own | {
         "others": [{"table": table_data(arm), **drawn_arm(arm)} for arm in others],
         "wrong": first_caveat is not None and first_caveat.status == "fail",
@@ -291,9 +292,8 @@ def write_panel(
         "floor": floor_of(scene),
         "clearance": clearance_data(robot, scene),
         "home": opened.tolist(),
-        "target": ((robot.base + frames(robot, opened)[-1]) / 2)[:3, 3].tolist(),  # where the picture's eye looks, m
-        "length": 0.68 * drawn_size(robot),
-        "turned": best_turn(robot, at_rest(robot, "", q=opened), 0.0, {"scene": solids, "size": own["size"]}),
+        "turned": turned,
+        **framed(seen, (robot, *others), at_rest(robot, "", q=opened, beside=[opened[None]] * len(others)), turned),
         "head": [*map(ascii_text, program_head(None) if head is None else head)],
     }
     render(

@@ -58,10 +58,11 @@ export class ArmView extends Space {
 
   #nearest({ from, to, text, touching }) {
     const { data, page } = this;
-    this.line([from, to], touching.length ? data.colours.touching : page.ink, 3);
+    this.line([from, to], touching.length || data.wrong ? data.colours.touching : page.ink, 3);
     for (const end of [from, to]) this.dot(end, touching.length ? page.touching : page.ink, 4, touching.length > 0);
     this.keepClear([0, 0.25, 0.5, 0.75, 1].map((part) => add(scaled(from, 1 - part), scaled(to, part))), 0);
-    this.word(text, scaled(add(from, to), 0.5), touching.length ? page.touching : page.ink);
+    if (data.wrong) document.getElementById("clearance").textContent = text;
+    this.word(text, scaled(add(from, to), 0.5), touching.length || data.wrong ? page.touching : page.ink);
   }
 
   #tableFrames(found, numbers) {
@@ -81,7 +82,7 @@ export class ArmView extends Space {
       const at = moved(poses[k + 1], middle);
       const tip = add(at, scaled(column(poses[k + 1], 2), 2 * this.table.direction[k] * half));
       this.line([at, tip], this.data.colours.joints[k], 3);
-      this.word(this.rows[k], Math.hypot(...middle) ? at : tip); // an axis along its link is in the arm
+      this.word(this.rows[k], Math.hypot(...middle) ? at : tip, this.data.wrong ? this.page.touching : this.page.ink); // an axis along its link is in the arm
     }
   }
 

@@ -61,12 +61,14 @@ class ListRow:
 
 @frozen
 class Group:
-    """Rows under one title, with how many they are where that is ``counted``; ``folded`` until they are asked for."""
+    """Rows under one title, with how many they are where that is ``counted``; ``folded`` until they are asked for.
+    ``ticks``: over the bars of the first row, in parts of them, in mm."""
 
     title: str
     rows: Sequence[ListRow]
     counted: bool = True
     folded: bool = False
+    ticks: Sequence[tuple[float, str]] = ()
 
 
 @frozen
@@ -142,5 +144,5 @@ def judged(rows: Sequence[ListRow], repairable: Sequence[ListRow] = ()) -> list[
         Group(tr("Don't run as they are"), fail),
         Group(tr("Can be repaired"), repairable),
         Group(tr("Doubts"), caution),
-        Group(tr("Pass"), passed, folded=len(passed) < len(rows) > MOST_ROWS),
+        Group(tr("Pass in the model"), passed, folded=len(passed) < len(rows) > MOST_ROWS),
     ]

@@ -58,7 +58,7 @@ def readings(figure: Figure) -> list[dict[str, Any]]:
     Returns
     -------
     list of {"box": left, bottom, right, top in parts of the image; "x", "y": scales; "curves": [part, name];
-    "drawn_to_scale"; "bars": [from, to (across), from, to (along), upright, name, colour]; "shades": the colour bar}
+    "drawn_to_scale"; "bars": [from, to (across), from, to (along), upright, name, colour]}
     """
     bars = {mappable.colorbar.ax for ax in figure.axes for mappable in _shaded(ax) if mappable.colorbar}
     return [
@@ -69,7 +69,7 @@ def readings(figure: Figure) -> list[dict[str, Any]]:
 
 
 def _axes(i: int, ax: Axes, others: list[Axes]) -> dict[str, Any]:
-    found: dict[str, Any] = {
+    return {
         "box": _extents(ax),
         "x": _scale(ax.xaxis, others),
         "y": _scale(ax.yaxis, others),
@@ -77,24 +77,6 @@ def _axes(i: int, ax: Axes, others: list[Axes]) -> dict[str, Any]:
         "curves": [[f"curve-{i}-{k}", _name(line.get_label())] for k, line in enumerate(_curves(ax))],
         "bars": [_bar(patch, own) for own in ax.containers if isinstance(own, BarContainer) for patch in own],
     }
-    if bar := _colour_bar(ax, others):
-        upright = bool(np.ptp(bar.ax.bbox.extents[1::2]) > np.ptp(bar.ax.bbox.extents[::2]))
-        found["shades"] = {
-            "box": _extents(bar.ax),
-            "upright": upright,
-            "scale": _scale(bar.ax.yaxis if upright else bar.ax.xaxis, []),
-            "steps": bar.cmap.N if bar.cmap.N <= MAX_STEPS else 0,
-        }
-    return found
-
-
-def _colour_bar(ax: Axes, others: list[Axes]) -> Any:
-    """The colour bar of the numbers in axes: their own, or one of the same colours and limits."""
-    for mappable in _shaded(ax):
-        for other in (mappable, *(shade for each in others for shade in _shaded(each))):
-            if other.colorbar and other.cmap.name == mappable.cmap.name and other.get_clim() == mappable.get_clim():
-                return other.colorbar
-    return None
 
 
 def _shaded(ax: Axes) -> list[Any]:

@@ -151,10 +151,18 @@ function heightAt(runs, u) {
   return NaN;
 }
 
+/** Where a figure's own edge is, whose place begins at `left`, `top`: in the middle of it, less border and padding. */
+function drawnPart(image, left, top) {
+  const { paddingLeft, borderLeftWidth } = getComputedStyle(image);
+  const edges = 2 * (parseFloat(paddingLeft) + parseFloat(borderLeftWidth));
+  const scale = Math.min((image.offsetWidth - edges) / image.naturalWidth, (image.offsetHeight - edges) / image.naturalHeight);
+  const [width, height] = [scale * image.naturalWidth, scale * image.naturalHeight];
+  return { x: left + (image.offsetWidth - width) / 2, y: top + (image.offsetHeight - height) / 2, width, height };
+}
+
 const NEAR = 12; // pixels
 
-// What a figure's axes say where the pointer is: curves over an axis at that place, other curves and marks where they
-// are near, bars, and colours by their colour bar.
+// What a figure's axes say where the pointer is: curves over an axis at that place, what is near, and bars.
 class Answers {
   constructor(image) {
     this.image = image;
@@ -167,21 +175,11 @@ class Answers {
     }
   }
 
-  /** The drawing's own edges in the window. */
-  edges() {
-    const { left, top, width, height } = this.image.getBoundingClientRect();
-    const style = getComputedStyle(this.image);
-    const edge = parseFloat(style.paddingLeft) + parseFloat(style.borderLeftWidth);
-    const own = this.drawing.viewBox.baseVal;
-    const scale = Math.min((width - 2 * edge) / own.width, (height - 2 * edge) / own.height);
-    const [w, h] = [scale * own.width, scale * own.height];
-    return { left: left + (width - w) / 2, top: top + (height - h) / 2, w, h };
-  }
-
   /** Lines of text, each with the colour of what it is about; none outside of all axes. */
   at(event) {
-    const { left, top, w, h } = this.edges();
-    const [u, v] = [(event.clientX - left) / w, 1 - (event.clientY - top) / h];
+    const { left, top } = this.image.getBoundingClientRect();
+    const { x: x0, y: y0, width: w, height: h } = drawnPart(this.image, left, top);
+    const [u, v] = [(event.clientX - x0) / w, 1 - (event.clientY - y0) / h];
     const axes = this.axes.find(({ box }) => u >= box[0] && u <= box[2] && v >= box[1] && v <= box[3]);
     if (!axes) return [];
     const { box, x, y } = axes;
@@ -206,11 +204,7 @@ class Answers {
     }
     const [found] = this.near(axes, u, v, w, h);
     const [place, title] = found ? [found.point, found.title] : [[u, v], ""];
-    const shade = axes.shades && this.shade(axes.shades, u, v);
-    return [
-      ...(title ? [{ text: title, colour: found.colour }] : []), named(x, across(place[0])), named(y, up(place[1])),
-      ...(shade ? [shade] : []),
-    ];
+    return [...(title ? [{ text: title, colour: found.colour }] : []), named(x, across(place[0])), named(y, up(place[1]))];
   }
 
   /** What is drawn close to the pointer, the closest first. */
@@ -221,33 +215,6 @@ class Answers {
       .filter(({ gap }) => gap < NEAR)
       .sort((a, b) => a.gap - b.gap)
       .slice(0, 1);
-  }
-
-  /** The number that a colour stands for: the place of the colour bar that has it. */
-  shade({ box, upright, scale, steps }, u, v) {
-    if (!this.pixels) {
-      const canvas = document.createElement("canvas");
-      [canvas.width, canvas.height] = [this.image.naturalWidth, this.image.naturalHeight];
-      this.pixels = canvas.getContext("2d", { willReadFrequently: true });
-      this.pixels.drawImage(this.image, 0, 0, canvas.width, canvas.height);
-    }
-    const { width, height } = this.pixels.canvas;
-    const colour = (x, y) => this.pixels.getImageData(Math.round(x * width), Math.round((1 - y) * height), 1, 1).data;
-    const own = colour(u, v);
-    let best = { gap: 60, part: NaN };
-    for (let k = 2; k <= 254; k++) {
-      const part = k / 256;
-      const there = upright
-        ? colour((box[0] + box[2]) / 2, box[1] + part * (box[3] - box[1]))
-        : colour(box[0] + part * (box[2] - box[0]), (box[1] + box[3]) / 2);
-      const gap = (own[0] - there[0]) ** 2 + (own[1] - there[1]) ** 2 + (own[2] - there[2]) ** 2;
-      if (gap < best.gap) best = { gap, part };
-    }
-    if (Number.isNaN(best.part)) return null;
-    const value = steps
-      ? String(Math.round(along(scale, (Math.floor(best.part * steps) + 0.5) / steps)))
-      : `≈ ${reading(scale, along(scale, best.part), 2)}`;
-    return { text: `${scale.name}${WORDS.colon}${value}`, colour: `rgb(${own[0]} ${own[1]} ${own[2]})` };
   }
 }
 

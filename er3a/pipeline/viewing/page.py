@@ -381,7 +381,7 @@ def render_stage(
     answer: Answer,
     **context: Any,
 ) -> None:
-    """Render the page of a stage of a robot, from the template beside its ``report.py``.
+    """Render the page of a stage of a robot, from the template next to its ``report.py``.
 
     Parameters
     ----------

@@ -18,10 +18,10 @@ from er3a.pipeline.messages.say import joined
 from er3a.robots.robot import Robot
 
 Kind = Literal["right", "wrong"]
-LabelKind = Literal["wrong", "open", "hole", "right", "sound", "floor"]
+LabelKind = Literal["wrong", "open", "hole", "right", "sound"]
 MARGIN = 0.06  # of the larger side
 UPRIGHT = 0.83  # width of a drawing, of its height
-LABEL, SCALE = 0.24, 0.05  # of the height: room for labels at the right, for the scale below
+LABEL, SCALE = 0.28, 0.05  # of the height: room for labels at the right, for the scale below
 LETTERS = 0.021  # of the height: of a line's word
 SIDES = np.array(
     [(0, 1.4), (1.9, 0), (0, -1.4)]
@@ -71,7 +71,6 @@ class Label:
     ----------
     name : by which an address on the page leads to it, or the entry of the table that it is of
     start : (2,), mm, from where a dashed line leads to the place; None for none
-    written_there : at its place, though others are in a column
     """
 
     text: str
@@ -79,7 +78,6 @@ class Label:
     kind: LabelKind
     name: str = ""
     start: Reals | None = None
-    written_there: bool = False
 
 
 @by_identity
@@ -200,11 +198,11 @@ def side_view(
         floor = '<rect class="floor" x="{:.0f}" y="{:.0f}" width="{:.0f}" height="{:.0f}"/>'
         parts.append(Markup(floor).format(low[0] - wide, -floor_mm, 3 * wide, 3 * tall))
         below = np.array([low[0], floor_mm - GAP * tall])
-        labels = [*labels, Label(tr("floor"), below, "floor", written_there=True)]
+        parts.append(_text("floor", below, 1.25 * LETTERS * tall, tr("floor")))
     placed = _placed(labels, low, high, column_mm)
     thick = min(BONE * tall, THICKEST * float(np.ptp(arms[0].points_mm, axis=0).max()))
     parts += [_arm(arm, thick * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
-    parts += [_lead(label, place) for label, place in placed]
+    parts += [_lead(k, *each, LETTERS * tall) for k, each in enumerate(placed, 1)]
     parts += _over(arms, over, LETTERS * tall)
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
@@ -232,8 +230,7 @@ def _over(arms: Sequence[SeenArm], lines: Sequence[DrawnLine], letters: float) -
             others = np.concatenate(taken)
             at = max(places, key=lambda place: np.linalg.norm(others - place, axis=1).min())
             taken.append(at[None])
-            word = '<text x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>'
-            drawn += Markup(word).format(at[0], letters / 3 - at[1], letters, line.word)
+            drawn += _text("", at, letters, line.word)
         found.append(Markup('<g class="{}" data-entry="{}">{}</g>').format(line.look, line.entry, drawn))
     return found
 
@@ -244,38 +241,45 @@ def _name(arm: SeenArm) -> Markup:
 
 def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float | None) -> list[tuple[Label, Reals]]:
     """Labels from above, each with where it is written (2,), mm: none on another, none below the drawing."""
-    # Of those at one height the nearest to the column is written first: their lines don't cross.
-    order = sorted(labels, key=lambda each: (-round(each.at[1]), -each.at[0]))
-    gap, above = GAP * (high[1] - low[1]), high[1]
-    heights = [above := min(above - gap, float(label.at[1])) for label in order]
-    below = low[1]
-    for k in reversed(range(len(order))):
-        below = heights[k] = max(below + gap, heights[k])
+    # Of those at one height the farthest from the column is written first: their lines don't cross.
+    order = sorted(labels, key=lambda each: (-round(each.at[1]), each.at[0]))
+    gap, below, above = GAP * (high[1] - low[1]), low[1], high[1]
+    heights = [below := max(below + gap, float(label.at[1])) for label in reversed(order)][::-1]
+    for k in range(len(order)):
+        above = heights[k] = min(above - gap, heights[k])
     return list(zip(order, np.column_stack([[_across(label, column_mm) for label in order], heights])))
 
 
 def _across(label: Label, column_mm: float | None) -> float:
     """How far forward (mm) a label begins."""
-    return float(label.at[0]) if column_mm is None or label.written_there else column_mm
+    return float(label.at[0]) if column_mm is None else column_mm
 
 
-def _lead(label: Label, place: Reals) -> Markup:
-    """The line of a label: from its start, or to where it is written if that is not its place."""
+def _lead(number: int, label: Label, place: Reals, letters: float) -> Markup:
+    """The line of a label: from its start, or to where it is written if that is not its place. Its number there is seen
+    where labels are a list."""
     if label.start is None and place[0] == label.at[0]:
         return Markup("")
     start, dashed = (label.at, "") if label.start is None else (label.start, "dashed")
-    line = _line(np.stack([start, label.at, place]))
-    return Markup('<polyline class="lead {} {}" points="{}"/>').format(label.kind, dashed, line)
+    line = Markup('<polyline class="lead {} {}" points="{}"/>')
+    return line.format(label.kind, dashed, _line([start, label.at, place])) + _text(
+        label.kind, start, 2 * letters, str(number)
+    )
+
+
+def _text(kind: str, at: Reals, letters: float, text: str) -> Markup:
+    """A word in the drawing, in the middle of a place."""
+    word = '<text class="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>'
+    return Markup(word).format(kind, at[0], letters / 3 - at[1], letters, text)
 
 
 def _word(label: Label, share: Reals) -> Markup:
     """A label, at its place in parts of the drawing."""
-    word = '<span class="label {}{}" data-entry="{}" style="left: {:.1f}%; bottom: {:.1f}%">{}</span>'
-    there = " there" if label.written_there else ""
-    return Markup(word).format(label.kind, there, label.name, *(100 * share), label.text)
+    word = '<span class="label {}" data-entry="{}" style="left: {:.1f}%; bottom: {:.1f}%">{}</span>'
+    return Markup(word).format(label.kind, label.name, *(100 * share), label.text)
 
 
-def _line(points: Reals) -> str:
+def _line(points: Iterable[Reals]) -> str:
     return " ".join(f"{x:.0f},{-z:.0f}" for x, z in points)
 
 

@@ -12,7 +12,7 @@ const LAMP = [0.9, -1.3, 2.4];
 const SHADOWS = 1024; // side of the map of shadows, px
 const MAX_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
 const GRID_STEPS = 8; // lines of the floor on each side of the base
-const PALE = 0.36;
+const [PALE, DIMMED] = [0.36, 0.4];
 const SMALL = 0.12; // radius of a body that its name would hide, in parts of what is seen
 // Lines behind bodies are faint; those of the floor are under all: they don't cross an arm below it.
 const LINES = {
@@ -29,6 +29,7 @@ const WIDE = 3; // heights that a step sideways counts for, at most
 const WORD = 0.85; // height of words, in letters of the page
 export const ARM = 0.05; // about half the width of an arm, in parts of its size: words keep off it
 const SIDES = 1.2; // a picture that is less wide, of its height, is filled on its sides
+const [INSET, CLOSER] = [0.26, 10]; // of the picture's smaller side, a part that is shown so many times larger
 const FIELD = 1.9; // distance of the eye, in heights of the picture at the target
 
 const pen = document.createElement("canvas").getContext("2d");
@@ -118,15 +119,17 @@ export class Space extends Orbit {
     return this.materials.get(key);
   }
 
-  /** A square floor at height `z` around a point, which shadows fall on. */
-  floor(centre, step, z) {
+  /** A square floor at height `z` around a point, which shadows fall on; one that is `solid` dims what is below it. */
+  floor(centre, step, z, solid = false) {
     const half = GRID_STEPS * step;
     const ends = Array.from({ length: 2 * GRID_STEPS + 1 }, (_, i) => (i - GRID_STEPS) * step).flatMap((at) => [
       [at, -half], [at, half], [-half, at], [half, at],
     ]);
     this.segments(ends.flatMap(([x, y]) => [centre[0] + x, centre[1] + y, z]), this.page.grid, 1, ["under"]);
     if (this.ground) return;
-    this.ground = new three.Mesh(new three.PlaneGeometry(2 * half, 2 * half), new three.ShadowMaterial({ opacity: 0.22, depthWrite: false }));
+    const side = (solid ? 6 : 2) * half;
+    this.ground = new three.Mesh(new three.PlaneGeometry(side, side), solid ? this.material(this.page.halo, DIMMED) : new three.ShadowMaterial({ opacity: 0.22, depthWrite: false }));
+    this.ground.renderOrder = solid ? 2 : 0;
     this.ground.position.set(centre[0], centre[1], z);
     this.ground.receiveShadow = true;
     this.scene.add(this.ground);
@@ -142,9 +145,26 @@ export class Space extends Orbit {
     const { position, right, up, back } = this.eye;
     this.camera.matrix.set(...[0, 1, 2].flatMap((i) => [right[i], up[i], back[i], position[i]]), 0, 0, 0, 1);
     this.camera.updateMatrixWorld(true);
+    this.#field(width, height, this.distance);
+    this.inset = null;
+  }
+
+  /** The camera's field: so many px of the picture, of what is about `distance` (m) off. */
+  #field(width, height, distance) {
     const fov = (2 * Math.atan(height / 2 / this.scale) * 180) / Math.PI;
-    Object.assign(this.camera, { fov, aspect: width / Math.max(1, height), near: this.distance / 50, far: this.distance * 10 });
+    Object.assign(this.camera, { fov, aspect: width / Math.max(1, height), near: distance / 50, far: distance * 10 });
     this.camera.updateProjectionMatrix();
+  }
+
+  /** Shows what is about a point again in a corner, `CLOSER` times as large. */
+  closer(point) {
+    const [x, y, depth] = this.seen(point);
+    const side = INSET * Math.min(this.width, this.height);
+    const [left, top] = [this.width, this.height].map((end) => end - side - this.letters);
+    this.inset = { left, side, depth: depth / CLOSER, position: add(point, scaled(this.eye.back, depth / CLOSER)) };
+    this.#svg("path", { d: `M${x},${y}L${left},${top}h${side}v${side}h${-side}v${-side}`, fill: "none", stroke: this.page.muted });
+    this.taken.push([left + side / 2, top + side / 2, side, side]);
+    this.#svg("text", { x: left + 2 * this.letters, y: top + this.letters, fill: this.page.ink, stroke: this.page.halo, "font-size": WORD * this.letters }, `× ${CLOSER}`);
   }
 
   /** Shows the picture. */
@@ -158,7 +178,18 @@ export class Space extends Orbit {
       renderer.setPixelRatio(ratio);
       renderer.setSize(width, height, false);
     }
+    renderer.setViewport(0, 0, width, height);
     renderer.render(this.scene, this.camera);
+    if (this.inset) {
+      const { left, side, depth, position } = this.inset;
+      this.camera.matrix.setPosition(...position);
+      this.camera.updateMatrixWorld(true);
+      this.#field(side, side, depth);
+      renderer.setScissorTest(true);
+      for (const part of ["setViewport", "setScissor"]) renderer[part](left, this.letters, side, side);
+      renderer.render(this.scene, this.camera);
+      renderer.setScissorTest(false);
+    }
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.svg.replaceChildren(...this.words);
   }

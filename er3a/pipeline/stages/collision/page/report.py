@@ -11,7 +11,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, say, word
+from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import Fault, PlayedEvent, at_rest, fix_of
 from er3a.pipeline.player.player import drawing_head, player
@@ -81,7 +81,7 @@ def _answer(
     lines = [0.0, *([shapes.margin_mm] if shapes else [])]
     ends = [0.0, *(each.clearance_mm for each in closest)]
     span = min(ends), max(ends)
-    scale = tr("bars {low} to {high}, keep {keep:g} mm", low=fixed(span[0], 0), high=fixed(span[1], 0), keep=lines[-1])
+    ticks = [(float(np.interp(line, span, [0.0, 1.0])), fixed(line, 0)) for line in lines]
     near = shapes.near if shapes else ()
     rows = [_row(each, unreached, near, known.get(each.name), span, lines) for each in closest]
     hit, clear, elsewhere, partly = (
@@ -109,7 +109,7 @@ def _answer(
         all_caught(caught),
         in_vain,
         keys,
-        [Group(joined([title, scale if own is (hit or clear) else ""]), own[:MAX_ROWS]) for title, own in titled],
+        [Group(title, own[:MAX_ROWS], ticks=ticks if own is (hit or clear) else ()) for title, own in titled],
         next((row.fix for row in hit if row.fix), None),
     )
 

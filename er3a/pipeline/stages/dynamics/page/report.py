@@ -53,13 +53,15 @@ def held_parts(robot: Robot, masses: model.MassesUsed | None, held: model.Holdin
         return None
     lever = kg @ off * [1, 1, 0]
     far = off @ lever / np.linalg.norm(lever)
-    torques = abs(held.torque) * kg * far / (kg @ far)
+    shares = kg * far / (kg @ far)
+    names = [tr("link {number}", number=each.link) for each in links]
+    parts = zip(names, kg, far, shares, np.cumsum(shares))
     rows = []
-    for each, torque, mass, way in zip(links, torques, kg, far):
-        name = joined([tr("link {number}", number=each.link), with_unit(fixed(torque, 1), held.unit)], ": ")
+    for name, mass, way, share, end in (*parts, (tr("all"), kg.sum(), kg @ far / kg.sum(), 1.0, 1.0)):
+        said = joined([name, with_unit(fixed(abs(held.torque) * share, 1), held.unit)], ": ")
         note = f"{with_unit(number(mass, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}"
-        part = Part(0.0, max(0.0, torque / torques.max()), "none")
-        rows.append(ListRow("none", name, note, length=1.0, parts=[part]))
+        part = Part(max(0.0, end - share), end, "none")
+        rows.append(ListRow("none", said, note, length=1.0, parts=[part]))
     return Group(tr("Link mass × level distance to J{joint}.", joint=held.joint), rows, counted=False)
 
 

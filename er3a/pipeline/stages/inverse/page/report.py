@@ -133,7 +133,7 @@ def _row(target: model.TargetResult) -> ListRow:
 
 
 def _jogged(q_deg: Iterable[float]) -> Fix:
-    return Fix(tr("save it as a point of a program."), panel_address(q_deg), instead=False)
+    return Fix(tr("save this pose as a program point."), panel_address(q_deg), instead=False)
 
 
 def _section(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> dict[str, Any]:

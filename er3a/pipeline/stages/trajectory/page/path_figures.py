@@ -63,8 +63,8 @@ def nearness_picture(
         margin = shapes.margin_mm
         text = tr("shapes assumed: keep {mm:g} mm", mm=margin)
         ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.45, linewidth=0, label=text)
+    ax.plot(least.t_s, least.least_mm, "o", color=palette.INK, label=tr("least"))
     _key(ax)
-    ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
     far = fixed(least.least_mm, 1)
     caption = tr("Least: {far} mm at {t:.2f} s, {pair}.", far=far, t=least.t_s, pair=say(least.between))
     ax.set_xlim(0.0, rows.t_s[-1])

@@ -211,8 +211,8 @@ def _to_do(
         return text, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe":
         near = near_assumed(path, summary)
-        text = N_("Measure {pair}: passes if shapes are right to {far} mm.")
-        measure = tr(text, pair=say(near.pair), far=fixed(near.clearance_mm, 1)) if near else ""
+        text = N_("Measure this gap on the arm: {far} mm by assumed shapes.")
+        measure = tr(text, far=fixed(near.clearance_mm, 1)) if near else ""
         return joined([*remedies(path.of_program), measure], " "), None
     last = path.sound_end
     if last is None:

@@ -112,14 +112,17 @@ def answer_of(summary: model.TrajectorySummary, wrong: Mapping[str, Fault], play
     fault_rows, repairable = list[ListRow](), list[ListRow]()
     for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s)
-        (repairable if path.chosen else fault_rows).append(row)
+        if path.chosen:
+            repairable.append(replace(row, mark="caution"))
+        else:
+            fault_rows.append(row)
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [replace(_sound_row(path), mark="fail", note=as_expected(path)) for path in others if path not in sound]
     groups = judged([*unlike, *fault_rows, *map(_sound_row, sound)], repairable)
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
-    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance of passing paths"))] if clear else []
+    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     doubts = sum(row.mark == "caution" and not wrong[row.name].meant for row in fault_rows)
     doubted = tr("{count} in doubt.", count=doubts) if doubts else ""
     fixes = {row.name: row.fix for row in (*fault_rows, *repairable)}
@@ -243,8 +246,7 @@ def both_arms(
         "",
         tr("The tool lands up to {far} off.", far=most),
         tr("Both arms have the same joint values."),
-        [(f"{fixed(1000 * rows[-1][0], 0)}–{most}", tr("flange off at worst"))],
-        [Group(tr("Flange off, this table against the right one"), listed)],
+        groups=[Group(tr("Flange off, this table against the right one"), listed)],
     )
     signs = [own_title(arm.title) for arm in arms]
     drawn = player(arms[0], seen, beside=arms[1:], signs=signs, opened=opened)

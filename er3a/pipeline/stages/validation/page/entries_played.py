@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -11,13 +12,14 @@ from er3a.finding import Finding
 from er3a.identifiability.entries import column_of
 from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.references import entry_word, motion_seen
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, address_of, at_rest
 from er3a.pipeline.stages.validation.model import Conflict
 from er3a.pipeline.viewing.answer import Fix, ListRow
+from er3a.pipeline.viewing.drawn import drawn_size
 from er3a.pipeline.viewing.side_view import entry_places
 from er3a.pipeline.viewing.still import AZIMUTH, ELEVATION, axes_of
 from er3a.references.quantities import FRAME_OF_POINT, MM, AxisDistance
@@ -29,7 +31,8 @@ BELOW = 0.15  # of the reach, from one line to the next below the arm
 JOG = 30.0  # deg, or mm of a joint that slides
 LASTS_S, SHARE = 2.0, np.linspace(0.0, 1.0, 13)  # of a motion, and of its way
 TIP_M = 0.2  # from the flange to a mark on it, where it turns in its place
-LOOKED_FROM = (-np.pi / 2, np.pi)  # azimuth of the eye: from the arm's right side, and from behind
+LOOKED_FROM = (-np.pi / 2, N_("Side")), (2.8, N_("from behind"))  # azimuth of the eye, rad
+FORWARD = 0.45  # of the arm's size: the line along x on the floor
 LENGTHS, ANGLES, LIMITS = ("a", "d"), ("alpha", "beta", "offset"), ("lower", "upper")
 
 
@@ -42,28 +45,33 @@ def jog_rows(robot: Robot, looks: Iterable[Finding]) -> list[ListRow]:
     """
     rows = []
     for look in looks:
-        note = tr("or else enter {value}", value=fixed(-robot.direction[look.joint - 1], 0))
-        fix = Fix(say(look), address_of("validation", look.entry, 0.0, ""), instead=False)
-        rows.append(ListRow("caution", _asked(look), note, f"#cell-{look.entry}", (look.entry, LASTS_S), fix=fix))
+        said = tr("{place}.", place=re.split("[:：]", say(look))[0])
+        fix = Fix(said, address_of("validation", look.entry, 0.0, ""), instead=False)
+        name = joined([f"+J{look.joint}", tr("{motion}?", motion=motion_seen(look))], ": ")
+        other = fixed(-robot.direction[look.joint - 1], 0)
+        rows.append(ListRow("caution", name, other, f"#cell-{look.entry}", (look.entry, LASTS_S), fix=fix))
     return rows
 
 
 def reach_played(robot: Robot, reach: AxisDistance, q: Reals, conflict: Conflict) -> PlayedMotion:
     """The arm as far out as it reaches at joint values (n,), rad or m, over what documents state of that: for each a
-    line from axis 1 on. It has the robot's name."""
+    line from axis 1 on, and below them by how much they differ. It has the robot's name."""
     T = frames(robot, q)
     start, axis = T[0, :3, 3], T[0, :3, 2]
     way = T[FRAME_OF_POINT[reach.point], :3, 3] - start
     height, far = way @ axis, way - (way @ axis) * axis
+    step, forward = BELOW * np.linalg.norm(far) * axis, far / np.linalg.norm(far) / MM
+    top = start + height * axis
+    stated = sorted(each.expected for each in conflict.statements)
+    low = top - (len(stated) + 0.5) * step
     marks = []
-    said = []
-    for row, stated in enumerate(conflict.statements, 1):
-        below = start + (height - row * BELOW * np.linalg.norm(far)) * axis
-        end = below + stated.expected / MM * far / np.linalg.norm(far)
-        text = with_unit(fixed(stated.expected, 1), conflict.unit)
-        marks.append(_mark(below, end, text))
-        said.append(joined([own_title(stated.document), text], ": "))
-    return at_rest(robot, robot.name, joined(said), q=q, marks=marks, turned=LOOKED_FROM[0] - AZIMUTH, elevation=0.0)
+    for row, value in enumerate(stated, 1):
+        level, end = top - row * step, value * forward
+        marks.append(_mark(level, level + end, with_unit(fixed(value, 1), conflict.unit)))
+        marks.append(_mark(top + end, low + end, ""))
+    ends = low + stated[0] * forward, low + stated[-1] * forward
+    marks.append(_mark(*ends, with_unit(fixed(stated[-1] - stated[0], 1), conflict.unit)))
+    return at_rest(robot, robot.name, q=q, marks=marks, turned=-np.pi / 2 - AZIMUTH, elevation=0.0)
 
 
 def entries_played(robot: Robot, cells: Mapping[str, Any], looks: Iterable[Finding]) -> list[PlayedMotion]:
@@ -100,10 +108,6 @@ def entries_played(robot: Robot, cells: Mapping[str, Any], looks: Iterable[Findi
     return found or [at_rest(robot, robot.name, q=zero)]
 
 
-def _asked(look: Finding) -> str:
-    return joined([f"+J{look.joint}", tr("{motion}?", motion=motion_seen(look))], ": ")
-
-
 def _jogged(robot: Robot, look: Finding) -> PlayedMotion:
     """A jog in +, with the arm as it would end if the direction were the other; words where the flange is then, or a
     mark on it that turns with it, seen from where these are farthest from each other."""
@@ -112,17 +116,19 @@ def _jogged(robot: Robot, look: Finding) -> PlayedMotion:
     T = forward(robot, np.stack([start + jog, start - jog]))
     turning = SeenMotion(look.pose_deg, look.joint, look.point, look.seen).manner != "moves"
     ends = _tips(T) if turning else T[:, :3, 3]
-    seen = max(LOOKED_FROM, key=lambda each: float(np.linalg.norm(axes_of(each, ELEVATION)[:2] @ (ends[0] - ends[1]))))
-    own = int(robot.direction[joint])
+    way = ends[0] - ends[1]
+    eye, seen = max(LOOKED_FROM, key=lambda each: float(np.linalg.norm(axes_of(each[0], ELEVATION)[:2] @ way)))
+    own, foot, ahead = int(robot.direction[joint]), robot.base[:3, 3], FORWARD * drawn_size(robot) * robot.base[:3, 0]
+    said = joined([f"+J{look.joint}", tr(seen).lower()], ", ")
     return PlayedMotion(
         look.entry,
         "",
         LASTS_S * SHARE,
         start + SHARE[:, None] * jog,
-        [PlayedEvent(0.0, LASTS_S, _asked(look), "caution", joints=((look.joint, ""),))],
-        _choice(T[:, :3, 3], ends, (fixed(own, 0), fixed(-own, 0)), LASTS_S),
+        [PlayedEvent(0.0, LASTS_S, said, "plain", joints=((look.joint, ""),))],
+        [_mark(foot, foot + ahead, "x"), *_choice(T[:, :3, 3], ends, (fixed(own, 0), fixed(-own, 0)), LASTS_S)],
         ghosts=[start - jog],
-        turned=seen - AZIMUTH,
+        turned=eye - AZIMUTH,
     )
 
 

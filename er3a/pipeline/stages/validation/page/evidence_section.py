@@ -92,7 +92,16 @@ def evidence_section(evidence: TableEvidence | None, behind: Collection[str] = (
     counts = Counter(LOOKS[each.trust] for each in evidence.entries if each.value is not None)
     present = {each.trust for each in numbers}
     legend = [(look, tr(text, count=counts[look])) for look, text in LEGEND.items() if counts[look]]
-    first = [ListRow("fail", entry_word(each.entry), _tool_off(each), f"#cell-{each.entry}") for each in left[:FIRST]]
+    first = [
+        ListRow(
+            "fail",
+            entry_word(each.entry),
+            _tool_off(each),
+            f"#cell-{each.entry}",
+            length=each.off.mm / (left[0].off.mm or 1.0),
+        )
+        for each in left[:FIRST]
+    ]
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence, todo) for kind in kinds]) for joint in joints],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from er3a.finding import fact
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import Weight
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.validation.model import Axes, Checks, KeyPoses, ValidationResults, model_of
+from er3a.pipeline.stages.validation.model import Checks, KeyPoses, ValidationResults, model_of
 from er3a.pipeline.stages.validation.page.diagnosis_section import corrected_robot
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Texts
@@ -32,30 +31,28 @@ arm stops {HOLD_S:g} s at each pose that a reference names; press play, or drag 
 POSES = """
 - blue ball: the model's flange or wrist centre
 - orange ball (magenta for claims): where the reference has it; the arrow is the deviation (from 0.1 mm on)
-- orange lines at the start: joint axes that references state, in the zero pose
 """
 
 
 def record(study: Study, stored: Stored[ValidationResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     results, robot = stored.results, model_of(study, stored.robot)
-    axes, poses = results.axes, results.key_poses
+    poses = results.key_poses
     stations = _stations(robot, poses)
     corrected, fault = corrected_robot(robot, results.summary.diagnoses)
     parts = [HEAD, LOOK if len(poses) else "", FINDINGS, POSES if len(poses) else ""]
     parts.append(f"- see-through arm: the same table, {fault}\n" if corrected is not None else "")
-    runs = [_run(robot, rows, following, results.checks) for rows, following in pairwise([*stations, None]) if rows]
     record_stage(
         study,
         stored,
         output,
         "".join(parts),
         robot=robot,
-        runs=[_with_axes(runs[0], axes, size_of(robot), last=len(runs) == 1), *runs[1:]],
+        runs=[_run(robot, rows, following, results.checks) for rows, following in pairwise([*stations, None]) if rows],
         curves=[Curves("deviation", "Largest deviation (mm)", ["largest deviation"], [REFERENCE], whole=True)],
         home=np.zeros(robot.joints),
         views={"Key poses": ["**"]},
-        points=[points / 1000 for points in (poses.point_mm, poses.model_point_mm, axes.point_mm)],
+        points=[points / 1000 for points in (poses.point_mm, poses.model_point_mm)],
         ghost=corrected,
         now="This pose",
     )
@@ -149,22 +146,6 @@ def _points(rows: KeyPoses, radius: float) -> list[tuple[float, str, Logged]]:
         ),
     }
     return [(t, entity, GONE if t else shape) for t in (0.0, HOLD_S) for entity, shape in shapes.items()]
-
-
-def _with_axes(run: Run, axes: Axes, size: float, last: bool) -> Run:
-    """The first run, with the stated joint axes until the arm leaves its zero pose."""
-    if not len(axes):
-        return run
-    point, half = axes.point_mm / 1000, axes.direction * size * 0.16
-    lines = rr.LineStrips3D(
-        np.stack([point - half, point + half], axis=1),
-        radii=size * 0.003,
-        colors=_colours(axes.grade),
-        labels=[f"J{joint} stated" for joint in axes.joint],
-        show_labels=False,
-    )
-    gone: list[tuple[float, str, Logged]] = [] if last else [(HOLD_S, "reference/axes", GONE)]
-    return replace(run, shapes=[*run.shapes, (0.0, "reference/axes", lines), *gone])
 
 
 def _colours(grades: Texts) -> list[tuple[int, int, int]]:

@@ -21,7 +21,7 @@ from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.references import entry_word
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES
-from er3a.pipeline.player.motions import PlayedMotion, address_of
+from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
@@ -149,8 +149,7 @@ def _pictured(
     if not off:
         motions = [*(each.motion for each in asked), *entries_played(robot, cells, looks)]
         picture = player(robot, motions, opened=(motions[0].name, float(motions[0].t[-1])))
-        rows = [each.row for each in asked]
-        return {"picture": picture, "drawing_head": drawing_head(), "asked": rows, "jogs": jog_rows(robot, looks)}
+        return {"picture": picture, "drawing_head": drawing_head(), "asked": asked, "jogs": jog_rows(robot, looks)}
     arms = [arms[0], replace(arms[-1], kind="wrong")]
     own = arms[-1]
     labels, over, q = list[Label](), list[DrawnLine](), np.zeros(robot.joints)
@@ -181,10 +180,11 @@ class _Asked:
         return reach_played(self.robot, self.reach, self.q, self.conflict)
 
     @property
-    def row(self) -> ListRow:
-        name, fix = self.robot.name, _to_measure(self.robot.name, self.conflict)
-        said = say(self.conflict.subject).capitalize()
-        return ListRow("conflict", said, f"{_stated(self.conflict)}?", "", (name, 1.0), fix=fix)
+    def rows(self) -> list[ListRow]:
+        """What each document states, as rows of the page's list."""
+        at, fix, unit = (self.robot.name, 1.0), _to_measure(self.conflict), self.conflict.unit
+        stated = [(own_title(each.document), fixed(each.expected, 1)) for each in self.conflict.statements]
+        return [ListRow("conflict", name, with_unit(value, unit), "", at, fix=fix) for name, value in stated]
 
     @property
     def lengths(self) -> list[str]:
@@ -201,7 +201,7 @@ class _Asked:
 
 
 def _steps(
-    contradicted: int, first: Sequence[ListRow], jogs: Sequence[ListRow], asked: Sequence[ListRow]
+    contradicted: int, first: Sequence[ListRow], jogs: Sequence[ListRow], asked: Sequence[_Asked]
 ) -> list[dict[str, Any]]:
     """The list at the table's side: the worst entries; or what to measure, as sources disagree, and what to confirm, of
     the first step each joint, where the picture shows them."""
@@ -210,14 +210,14 @@ def _steps(
     if contradicted:
         title = tr("The {shown} worst of {all} wrong entries", shown=len(first), all=contradicted)
         return [{"title": title, "beside": tr("at worst, tool off by"), "rows": first}]
-    before = [{"title": tr("Sources disagree."), "counted": False, "rows": asked}] if asked else []
+    before = [{"title": say(each.conflict.subject).capitalize(), "rows": each.rows} for each in asked]
     if not jogs:
         return [*before, {"title": tr("Confirm in this order"), "beside": tr("if wrong, tool off by"), "rows": first}]
-    off = tr("wrong: up to {off}", off=first[0].note)
+    title = tr("❶ Jog each joint (if wrong: {off})", off=first[0].note)
     then = [replace(row, fix=Fix(row.name, row.address, instead=False)) for row in first[1:]]
     return [
         *before,
-        {"title": f"❶ {first[0].name}", "beside": off, "rows": jogs},
+        {"title": title, "beside": tr("if not, enter"), "rows": jogs},
         {"title": "", "rows": then},
     ]
 
@@ -229,11 +229,13 @@ def _answer(
     found, counts = summary.verdict.finding, summary.counts.independent
     evidence = summary.evidence
     bad, unsure = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
-    keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.total else []
+    said = tr("checks pass, other values would too") if disputed else tr("independent checks pass")
+    keys = [(f"{counts.passed}/{counts.total}", said)] if counts.total else []
     if evidence and bad:
+        keys = [(f"{counts.total - counts.passed}/{counts.total}", tr("checks fail"))]
         keys.append((f"{bad}/{known_alone(evidence)}", tr("entries contradicted")))
-    values = [stated.expected for each in disputed[:1] for stated in each.statements]
     if disputed:
+        values = [stated.expected for stated in disputed[0].statements]
         off = with_unit(fixed(max(values) - min(values), 1), disputed[0].unit)
         keys.insert(0, (tr("{far} of difference", far=off), tr("between documents")))
     fix = None
@@ -243,7 +245,7 @@ def _answer(
             f"../{instead}/validation.html",
         )
     elif disputed:
-        fix = _to_measure(robot, disputed[0])
+        fix = _to_measure(disputed[0])
     elif is_one(found, "validation.left_open") and found.next_measurement:
         fix = Fix(to_settle(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
@@ -251,14 +253,9 @@ def _answer(
     return replace(_headline(summary, bad, unsure), keys=keys, fix=fix)
 
 
-def _stated(conflict: model.Conflict) -> str:
-    """What documents state of a disputed reach, in one clause."""
-    return with_unit(joined([fixed(stated.expected, 1) for stated in conflict.statements], tr(" or ")), conflict.unit)
-
-
-def _to_measure(robot: str, conflict: model.Conflict) -> Fix:
-    text = tr("measure the arm: {values}?", values=_stated(conflict))
-    return Fix(text, address_of("validation", robot, 0.0, ""), instead=False)
+def _to_measure(conflict: model.Conflict) -> Fix:
+    stated = joined([fixed(each.expected, 1) for each in conflict.statements], tr(" or "))
+    return Fix(tr("measure the arm: {values}?", values=with_unit(stated, conflict.unit)), instead=False)
 
 
 def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> Answer:

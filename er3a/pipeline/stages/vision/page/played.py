@@ -25,7 +25,7 @@ from er3a.robots.robot import Robot
 WAYS = {"move": N_("move to the approach"), "approach": N_("straight to the grasp"), "retreat": N_("retreat")}
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
 ROUND_M = {"radius": 0.02, "length": 0.06}
-SIGHT = 0.2  # of the farthest distance, how far the pyramid reaches that shows where a camera looks
+SIGHT = 0.7  # of the farthest distance, how far the pyramid reaches that shows where a camera looks
 EDGE, EDGE_M = 0.5, 0.0015  # opacity and radius of the pyramid's edges
 CAMERA_M = (0.09, 0.07, 0.07)
 EDGES = ((0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1))  # of a pyramid, its top first
@@ -118,7 +118,8 @@ def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[
     T = placed(found.hand_eye) if fixed_camera else inverted(robot.last_to_tool) @ placed(found.hand_eye)
     frame = 0 if fixed_camera else robot.rows + 1
     common = {"frame": frame, "name": tr("camera"), "T": T.tolist(), "colour": REFERENCE}
-    corners = _corners(task, SIGHT * task.view.farthest_mm / 1000)
+    low = min(each.xyz_mm[2] / 1000 for each in summary.objects) if fixed_camera and shapes else -np.inf
+    corners = _corners(task, T, low)
     points = np.concatenate([np.zeros((1, 3)), corners])
     sight = []
     for i, j in EDGES:
@@ -128,10 +129,14 @@ def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[
     return [*shapes, {**common, "kind": "box", "size": CAMERA_M}, *seen]
 
 
-def _corners(task: VisionFile, far: float) -> Reals:
-    """The corners (4, 3) of what a camera sees at a depth, m, in its frame."""
-    x, y = far * np.tan(np.radians([task.view.horizontal_deg, task.view.vertical_deg]) / 2)
-    return np.array([[-x, -y, far], [x, -y, far], [x, y, far], [-x, y, far]])
+def _corners(task: VisionFile, T: Reals, low: float) -> Reals:
+    """The corners (4, 3) of what a camera at ``T`` sees down to a height, or to where its picture ends, m, in its
+    frame."""
+    x, y = np.tan(np.radians([task.view.horizontal_deg, task.view.vertical_deg]) / 2)
+    rays = np.array([[-x, -y, 1.0], [x, -y, 1.0], [x, y, 1.0], [-x, y, 1.0]])
+    down = np.minimum(rays @ T[2, :3], -1e-9)
+    found: Reals = rays * np.minimum((low - T[2, 3]) / down, SIGHT * task.view.farthest_mm / 1000)[:, None]
+    return found
 
 
 def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:

@@ -134,7 +134,8 @@ def _errors(each: model.ObjectResult | None, task: VisionFile) -> list[Group]:
         text = f"{fixed(off, 2)} mm, {fixed(getattr(each.error_deg, part), 2)}°"
         parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
         rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
-    title = tr("{name}: 95 % error; line: {limit:g} mm", name=each.name, limit=limit)
+    turn = min(task.gripper.tolerance_deg)
+    title = tr("{name}: 95 % error; line {limit:g} mm/{turn:g}°", name=each.name, limit=limit, turn=turn)
     return [Group(title, rows, counted=False)]
 
 

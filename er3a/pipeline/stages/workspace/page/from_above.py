@@ -57,7 +57,7 @@ def from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, tra
     gap = 2 * np.pi - (high - low)
     if gap > DEAD:
         parts.append(Markup('<path class="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
-        words.append(_word(0.6 * reach * _way(high + gap / 2), height, tr("J1's dead zone"), "", size))
+        words.append(_word(0.6 * reach * _way(high + gap / 2), height, tr("J1's dead zone"), "zone", size))
     parts.append(Markup('<path class="axes" d="M{0:.0f},0H0V-{0:.0f}"/>').format(AXES * reach))
     words += [_word((AXES + BASE) * reach * way, height, axis, "", size) for axis, way in zip("xy", np.eye(2))]
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))

@@ -21,7 +21,7 @@ from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import Placing, found_by, placing_of
 from er3a.pipeline.stages.workspace.page.workspace_figures import about, if_normal
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark
 from er3a.pipeline.viewing.page import alternative_table, render_stage, whole_sentence
 from er3a.robots.robot import Robot
 
@@ -46,8 +46,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     if instead and (right := found_by(stored, "workspace", f"../{instead}")):
         arms.insert(0, (study.robot(instead), right.results))
         far, wrong = (fixed(1000 * each.summary.reach_m.furthest_from_axis, 0) for _, each in arms)
-        volumes = joined((fixed(each.summary.volume_m3.middle, 2) for _, each in reversed(arms)), " → ")
-        keys = [(volumes, tr("Reached volume, proven (m³)"))]
+        own, other = (fixed(each.summary.volume_m3.middle, 2) for _, each in arms)
+        keys = [(with_unit(own, "m³"), tr("proven, not {wrong} m³", wrong=other))]
         answer = Answer("", tr("The flange reaches {far}, not {wrong} mm.", far=far, wrong=wrong), keys=keys)
     render_stage(
         study,
@@ -93,9 +93,10 @@ def _answer(
         payload,
     ]
     groups = Group(tr("Where the tray goes"), rows), Group(tr("Where the tool can't go"), voids)
-    frames = [tr("Reach from axis 1, tray's centre in base frame.")]
+    frames = [tr("Reach from axis 1, tray in base frame.")]
     if placing and placing.tray.floor:
-        frames.append(tr("Its stand begins at z {height} mm.", height=millimetres([placing.tray.floor])))
+        low, high = (millimetres([z]) for z in (placing.tray.floor, placing.tray.low[2]))
+        frames.append(tr("Stand: z {low} to {high} mm.", low=low, high=high))
     return Answer(joined(said, " "), "", joined(frames, " "), keys, groups, fix)
 
 
@@ -114,9 +115,8 @@ def _tray_as_rows(placing: Placing | None, settled: bool) -> list[ListRow]:
     rows = []
     for number_, tried in enumerate(placing.tried, start=1):
         note = tr("blocks {count} of {all} motions", count=len(tried.hindered), all=placing.passing or 0)
-        rows.append(
-            ListRow("pass" if settled and not tried.hindered else "caution", tried.tray.name, note, f"#tray-{number_}")
-        )
+        mark: Mark = "caution" if tried.hindered else "pass" if settled else "no_reference"
+        rows.append(ListRow(mark, tried.tray.name, note, f"#tray-{number_}"))
     return rows
 
 

@@ -77,11 +77,10 @@ class Tray:
 
     @property
     def place_text(self) -> str:
-        """Its centre, and how high its stand is, or else what it is on."""
+        """Its centre where it is on a stand, or else what it is on."""
         if self.floor is None:
             return whole_sentence(self.where)
-        centre, gap = millimetres(self.place.centre_m), millimetres([self.low[2] - self.floor])
-        return tr("Tray: ({centre}) mm, stand {gap} mm.", centre=centre, gap=gap)
+        return tr("Tray: ({centre}) mm.", centre=millimetres(self.place.centre_m))
 
     @property
     def where(self) -> str:

@@ -88,7 +88,7 @@ def in_space(
         layers = [Layer(tr("reachable"), 1000 * results.cloud.point_m[:CLOUD_POINTS], REACHED)]
     else:
         body, faces = _reached_body(robot, results)
-        layers = [Layer(tr("reachable"), 1000 * body, REACHED, faces=faces, cut=True)]
+        layers = [Layer(joined([tr("reachable"), tr("cut open")], ", "), 1000 * body, REACHED, faces=faces, cut=True)]
     for i, void in enumerate(results.summary.voids, start=1):
         faces = triangles.corners[triangles.void == i]
         if len(faces):
@@ -101,7 +101,7 @@ def in_space(
         ways = [(middle.tolist(), (middle + border.rho_m[far] * AHEAD).tolist(), reaches(results.summary))]
     solids = surroundings(robot, scene, ways)
     for i, (tray, mark) in enumerate(zip(trays, marks), start=1):
-        colour = DOUBTFUL if mark == "caution" else VERDICTS[mark]
+        colour = VERDICTS["pass"] if mark == "pass" else DOUBTFUL
         drawn, *stand = drawn_scene(tray.parts, robot)
         parts = [drawn | {"colour": colour}, *stand]
         shown = f"tray-{i}", _reaching_in(robot, tray), _ways(tray)
@@ -119,11 +119,12 @@ def _reaching_in(robot: Robot, tray: Tray) -> list[Reals]:
 
 
 def _ways(tray: Tray) -> list[tuple[list[float], list[float], str]]:
-    """From the origin to below the middle of a tray along x and y, then up its stand, or else to its middle."""
+    """From axis 1 along x and y to the side of a tray, then up its stand, or else to its middle."""
     x, y, high = tray.place.centre_m
     low = 0.0 if tray.floor is None else tray.floor
     steps = np.diag([x, y, (high if tray.floor is None else tray.low[2]) - low])
-    starts = np.array([(0.0, 0.0, 0.0), (x, 0.0, 0.0), (x + tray.place.size_m[0] / 2, y, low)])
+    side = x + tray.place.size_m[0] / 2  # where nothing hides them
+    starts = np.array([(0.0, 0.0, low), (side, 0.0, low), (side, y, low)])
     return [
         (start.tolist(), (start + step).tolist(), axis + with_unit(millimetres([step.sum()]), "mm"))
         for start, step, axis in zip(starts, steps, ("x ", "y ", ""))
@@ -159,7 +160,7 @@ def labelled(
     arms: Sequence[tuple[Robot, model.WorkspaceResults]],
     floor_mm: float | None,
     contradicted: bool,
-    wide: float = WIDE,
+    wide: float = 0.0,
 ) -> Markup:
     """Arms in what they reach, seen across axis 1, with names: reach, floor, and the voids all around axis 1. An open
     one and a tray are elsewhere: the view from above shows them.
@@ -169,7 +170,7 @@ def labelled(
     arms : what is proven of each
     floor_mm : height of the floor in the base's frame; None where there is none
     contradicted : whether the table of the last arm is: that arm is red
-    wide : width of the drawing of two arms, of its height
+    wide : width of the drawing of two arms, of its height; 0 for one that holds all that the second one reaches
 
     Returns
     -------
@@ -189,7 +190,7 @@ def labelled(
         if arms[1:]:  # words at the side say how far
             said = joined([own_title(robot.title), millimetres([summary.reach_m.furthest_from_axis])], ": ")
             labels.append(Label(with_unit(said, "mm"), np.array([far, height]), kind))
-            over += dimension(far, height, height, kind)[:1]
+            over += [*dimension(far, height, height, kind)[:1], *([] if wide else [DrawnLine(outer, "mark")])]
             continue
         below = outer[:, 1].min() - BELOW * far
         labels.append(Label(reaches(summary), np.array([far / 2, below - BELOW * far]), kind, "reach"))
@@ -198,7 +199,7 @@ def labelled(
     return side_view(
         seen,
         floor_mm,
-        ratio=wide if arms[1:] else 1.2,
+        ratio=(wide or WIDE) if arms[1:] else 1.2,
         labels=labels,
         column_mm=beyond(seen) if arms[1:] else None,
         over=over,
@@ -248,5 +249,5 @@ def void_labels(summary: model.WorkspaceSummary, kind: Kind = "right") -> list[L
             labels.append(Label(said, at, "hole", f"hole-{number_}", start))
         elif not void.holds_shoulder:
             within = 1000 * np.array([INSIDE * low, (void.centroid_m[2] + void.high_m[2]) / 2])
-            labels.append(Label(tr("wrong table's void, {size}", size=about(void)), within, kind))
+            labels.append(Label(tr("wrong void, {size}", size=about(void)), within, kind))
     return labels
