@@ -169,7 +169,8 @@ def _judged(robot: Robot, pairs: Sequence[BodyPair]) -> tuple[MatrixRow, list[Bo
     guessed = share >= POOR_GUESS and not arm_shapes(robot).given
     if near and (guessed or (share > MOST and own and not capsules and _never_parts(robot, pairs))):
         return MatrixRow(*names, "coarse"), []
-    return _checked(robot, pairs, overlap)
+    row, watched = _checked(robot, pairs, overlap)
+    return row, [*pairs] if watched else []  # the distance of two links is that of all of their bodies
 
 
 def _never_parts(robot: Robot, pairs: Sequence[BodyPair]) -> bool:

@@ -25,6 +25,7 @@ GUESSED = 10.0
 WIDEST_RATIO, NARROWEST_RATIO = 3.0, 0.1
 """Radius of gyration against that of the filled capsules."""
 WEIGHT_RATIO = 0.15  # of the stated weight, by which the sum of the links may differ
+LIGHT = 0.01  # of the arm's mass: of less than that, as a flange, a moment of inertia changes no torque
 PARALLEL_RATIO = 2.0  # of the inertia that the shape would have: more is too much
 
 
@@ -40,14 +41,12 @@ def mass_findings(robot: Robot) -> tuple[Finding, ...]:
     findings : at most a few for each link; empty if nothing is implausible
     """
     shapes = link_shapes(robot)
-    beyond = size_of(robot)
-    armature = drives_of(robot).armature
-    moved_by_one = robot.coupling is None
+    drives, total = drives_of(robot), sum(each.body.mass for each in robot.masses.links)
     found: list[Finding] = []
     for link in range(1, robot.rows + 1):  # the base loads no joint
         body = robot.masses.body(link)
         if body is None or not has_mass(body):
-            rotor = moved_by_one and armature[link - 1] > 0
+            rotor = robot.coupling is None and drives.armature[link - 1] > 0
             # A massless link with mass beyond it is no singular joint: what it carries has inertia about its axis.
             carries = any(has_mass(robot.masses.body(k)) for k in range(link + 1, robot.rows + 1))
             found.append(fact("missing_link", link=link, singular=not rotor and not carries))
@@ -56,10 +55,10 @@ def mass_findings(robot: Robot) -> tuple[Finding, ...]:
         elif body.mass == 0:
             found.append(fact("inertia_without_mass", link=link))
         elif not any(body.inertia):
-            found.append(fact("point_mass", link=link))
+            found += [fact("point_mass", link=link)] if body.mass > LIGHT * total else []
         elif link in shapes:
-            found += _against_shape(link, body, shapes[link], beyond)
-    return (*found, *_against_weight(robot, any(is_one(each, "missing_link") for each in found)))
+            found += _against_shape(link, body, shapes[link], size_of(robot))
+    return (*found, *_against_weight(robot, total, any(is_one(each, "missing_link") for each in found)))
 
 
 def has_mass(body: MassBody | None) -> bool:
@@ -112,9 +111,9 @@ def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> 
     return found
 
 
-def _against_weight(robot: Robot, incomplete: bool) -> list[Finding]:
+def _against_weight(robot: Robot, total: float, incomplete: bool) -> list[Finding]:
     """Whether the sum of the links' masses contradicts the stated weight."""
-    weight, total = robot.masses.weight, sum(each.body.mass for each in robot.masses.links)
+    weight = robot.masses.weight
     if not (np.isfinite(weight) and robot.masses.links):
         return []
     complete = not incomplete and robot.masses.body(0) is not None

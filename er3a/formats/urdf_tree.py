@@ -396,7 +396,7 @@ def _root(tree: Tree) -> str:
 
 def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
     """Joints from a link on, as long as there is only one way."""
-    chain, passive = list[UrdfJoint](), list[UrdfJoint]()
+    chain, passive = list[UrdfJoint](), list[str]()
     while link in tree.by_parent:
         onward = tree.by_parent[link]
         moving, active = tree.onward(link)
@@ -409,17 +409,16 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
             raise InputError(tree.path, f"link {link}", problem, f"Name where the arm ends by --tip: {some(ends)}")
         if not active and len(moving) > 1:
             break
-        if active and len(active) < len(moving):
-            passive += [joint for joint in moving if joint not in active]
+        if active:
+            passive += [joint.name for joint in moving if joint not in active]
         if not moving and len(onward) > 1:
-            notes.append(f"several fixed frames follow {link}; it was taken as the flange")
+            if any((joint.T_parent_joint != np.eye(4)).any() for joint in onward):  # else it is where each of them is
+                notes.append(f"several fixed frames follow {link}; it was taken as the flange")
             break
         chain.append((active or moving or onward)[0])
         link = chain[-1].child
     if passive:
-        notes.append(
-            f"joints beside the chain that only follow others were left out: {some([each.name for each in passive])}"
-        )
+        notes.append(f"joints beside the chain that only follow others were left out: {some(passive)}")
     return chain
 
 
@@ -817,7 +816,7 @@ def collision_shape(
             corners = cylinder_points(core, radius)
         case "sphere":
             x, y, z = T[:3, 3].tolist()
-            return Envelope(link, (x, y, z), (x, y, z), max(float(_sizes(path, where, shape)[0]), SMALLEST_SPHERE_M))
+            return Envelope(link, (x, y, z), (x, y, z), float(_sizes(path, where, shape)[0]))
         case _:
             corners, faces, closed = _mesh(path, where, shape)
             few = len(corners) <= MOST_CORNERS
@@ -942,14 +941,15 @@ def _obj(points: Reals, faces: Integers) -> str:
 
 
 def _sizes(path: Path, where: str, shape: ElementTree.Element | None) -> Reals:
-    """Sizes, m, of a box along x, y and z, of a cylinder (radius, length) or of a sphere (radius), none below 0."""
+    """Sizes, m, of a box along x, y and z, of a cylinder (radius, length) or of a sphere (radius), none below 0; a
+    sphere of no size, with which files say that a link has no shape, is too small to matter."""
     kind = "" if shape is None else shape.tag
     keys = {"box": ("size",), "cylinder": ("radius", "length")}.get(kind, ("radius",))
     default = (1.0, 1.0, 1.0) if kind == "box" else None
     sizes = np.concatenate([numbers_of(path, where, shape, key, default) for key in keys])
     if (sizes < 0).any():
         raise InputError(path, where, f"a size of {sizes.min():g} m is below 0", "Write sizes above 0")
-    return sizes
+    return sizes.clip(SMALLEST_SPHERE_M if kind == "sphere" else 0.0)
 
 
 def _mesh(path: Path, where: str, shape: ElementTree.Element | None) -> tuple[Reals, Integers, bool]:

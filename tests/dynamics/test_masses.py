@@ -77,6 +77,13 @@ def test_faults_of_masses_are_named_with_their_link(arm, change, kind, link):
     assert found[0].link == link
 
 
+def test_a_flange_of_grams_needs_no_inertia(arm):
+    for mass, doubted in ((0.02, False), (0.5, True)):
+        links = (*arm.masses.links, LinkMass(6, MassBody(mass)))
+        found = mass_findings(arm.replace(masses=replace(arm.masses, links=links)))
+        assert [each.code for each in found] == ["point_mass"] * doubted
+
+
 def test_the_sum_against_the_manufacturers_weight(arm):
     def findings(weight):
         found = mass_findings(arm.replace(masses=replace(arm.masses, weight=weight)))

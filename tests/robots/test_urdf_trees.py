@@ -51,6 +51,15 @@ def written(tmp_path):
     return write
 
 
+@pytest.mark.parametrize(("away", "named"), [("0 0 0", False), ("0 0 0.1", True)])
+def test_frames_at_the_flange_are_no_choice(written, away, named):
+    """As ``tool0`` and ``tcp``, which makers' files put at one place."""
+    ends = [joint(name, "fixed", "l5", name, xyz=xyz, more="") for name, xyz in (("tool0", "0 0 0"), ("tcp", away))]
+    found = import_urdf(written(row(6), *ends))
+    assert any("fixed frames" in note for note in found.notes) == named
+    assert found.tip == "l5"
+
+
 def peer_poses(path, names, q, frame):
     """Flange poses by Pinocchio, which knows joints by their names and followers by their <mimic>."""
     model = pinocchio.buildModelFromUrdf(str(path), mimic=True)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from er3a.collision.scene import Plane, Scene
 from er3a.files.robot_library import load_robot
 from er3a.finding import fact
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages import workspace  # noqa: F401
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.stages.workspace.compute import judge
+from er3a.pipeline.stages.workspace.compute import buried, judge
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import search_reach, section_cells
@@ -95,6 +98,16 @@ def test_an_enclosed_void_away_from_the_shoulder_is_never_passed_over(voids, und
     verdict = judge(voids, undecided)
     assert (verdict.status, verdict.finding.code) == (status, f"workspace.{code}")
     assert "void_" not in code or verdict.finding.litres == 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "height", "within"), [("open", 0.1, True), ("open", 0.0, False), ("enclosed", 0.1, False)]
+)
+def test_an_open_void_below_the_floor_is_no_finding(kind, height, within):
+    """An enclosed one says of the arm's limits what it says anywhere."""
+    void = replace(void_record(True), kind=kind, vertices=np.array([[0.3, 0, 0.05], [0.3, 0, -0.2], [0.4, 0, -0.1]]))
+    assert buried(void, Scene("made", (Plane("floor", np.array([0.0, 0.0, 1.0]), height),))) is within
+    assert not buried(void, None)
 
 
 def test_a_verdict_says_which_limit_makes_the_void():

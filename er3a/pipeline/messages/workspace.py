@@ -50,9 +50,8 @@ TEXTS = texts(
         ),
         "stand.fits": "On {name:own}: centre at ({centre}) mm; {reached}.",
         "stand.none": (
-            "Not on {name:own}: [at {height} mm it is lower than the {lowest} mm allowed{too_low:?}][there is no "
-            "room for it{too_small:?}][nowhere on it does the tool reach all of the tray{out_of_reach:?}][the arm "
-            "comes within {margin} mm of the scene or of itself{in_the_way:?}]."
+            "Not on {name:own}: [there is no room for it{too_small:?}][nowhere on it does the tool reach all of the "
+            "tray{out_of_reach:?}][the arm comes within {margin} mm of the scene or of itself{in_the_way:?}]."
         ),
         "box.run_again": (
             "Before a motion is run there, put the tray, and its stand if any, into the study's scene file as boxes, "
@@ -124,6 +123,5 @@ def stand_text(stand: model.StandSummary, placement: model.PlacementSummary) -> 
     if stand.place and stand.served_from_m is not None:
         reached = reached_text(placement, stand.served_from_m)
         return sentence("stand.fits", name=stand.name, reached=reached, centre=millimetres(stand.place.centre_m))
-    lengths = {"margin": as_text(placement.margin_mm, "g"), "lowest": as_text(placement.task.lowest_mm, "g")}
-    why = {each: each == stand.why_none for each in ("too_low", "too_small", "out_of_reach", "in_the_way")}
-    return sentence("stand.none", name=stand.name, height=millimetres([stand.height_m]), **lengths, **why)
+    why = {each: each == stand.why_none for each in ("too_small", "out_of_reach", "in_the_way")}
+    return sentence("stand.none", name=stand.name, margin=as_text(placement.margin_mm, "g"), **why)

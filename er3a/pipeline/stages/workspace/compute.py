@@ -10,7 +10,7 @@ from er3a.by_value import by_identity
 from er3a.collision.along import bodies_of
 from er3a.collision.matrix import solids_met
 from er3a.collision.scene import Box, Scene
-from er3a.collision.shapes import shapes_assumed
+from er3a.collision.shapes import depths_in, shapes_assumed
 from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import translation
 from er3a.kinematics.forward import forward
@@ -65,6 +65,17 @@ def _size_and_place(void: Void) -> dict[str, float]:
     return {"litres": 1000 * void.lower, "x_mm": x, "y_mm": y, "z_mm": z}
 
 
+def buried(void: Void, scene: Scene | None) -> bool:
+    """Whether an open void is within a solid of the scene, such as below a floor, where no tool goes in any case.
+
+    Parameters
+    ----------
+    scene : None for none
+    """
+    solids = scene.solids if scene and void.kind == "open" else ()
+    return any(depths_in(solid, void.vertices).min() > 0 for solid in solids)
+
+
 @by_identity
 class _Samples:
     """The samples of a study: counts in the section's cells; joints (n, 6), rad, of the cloud, and of those that are
@@ -89,8 +100,8 @@ def compute(study: Study, name: str) -> model.WorkspaceResults:
     grid = samples.grid
     settings, motion = study.section(WorkspaceSettings), study.section(TrajectorySettings)
     proven = prove_robot(robot, settings.proof_cells, study.seed)
-    voids = proven_voids(robot, proven)
     scene = study.scene(name, "capability")
+    voids = [void for void in proven_voids(robot, proven) if not buried(void, scene)]
     assumed = shapes_assumed(robot, study.assumed_margin(name), {})
     margin = study.assumed_margin(name) if assumed else motion.penetration_tolerance_mm / 1000
     asked = study.section(CapabilitySettings)

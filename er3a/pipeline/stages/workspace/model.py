@@ -269,7 +269,7 @@ class PlaceSummary:
     clearance_mm: float | None = None
 
 
-WhyNoStand = Literal["too_low", "too_small", "out_of_reach", "in_the_way"]
+WhyNoStand = Literal["too_small", "out_of_reach", "in_the_way"]
 
 
 @frozen
@@ -281,8 +281,8 @@ class StandSummary:
     name : of its solid; height_m : in the base frame
     place : the best on it, None where none fits
     served_from_m : how far above the tray's underside the tool begins to reach all of it; None without a place
-    why_none : why no place fits: it lies lower than the task allows, has no room for the tray, is out of the tool's
-        reach, or an arm that reaches all of the tray comes too near to the scene or to itself
+    why_none : why no place fits: it has no room for the tray, is out of the tool's reach, or an arm that reaches all of
+        the tray comes too near to the scene or to itself; None too where it is lower than the task allows
     above : where nothing fits on it, the best place over it, on something else between them; None where there is none
     """
 

@@ -50,7 +50,6 @@ from er3a.workspace.placement import (
 from er3a.workspace.proven import Proven
 from er3a.workspace.tool_inverse import lacking_for_maps, pose_cost, tried_values
 
-SAME_HEIGHT = 1e-9  # m
 MAX_ACROSS, MAX_ACROSS_REDUNDANT = 64, 28
 CELLS_S, PLACES_S = 8.0, 8.0  # s by the model of `pose_cost`, never of a clock: equal on all machines
 _MIN_CELLS, _MIN_DIRECTIONS, _MAX_ROLLS = 400, 24, 4
@@ -234,8 +233,9 @@ def _placed(
     stands = []
     supports = supports_of(scene) if scene else ()
     for support in supports:
-        place, above, served_from, why = None, None, None, _why_not(support, task)
-        if why is None:
+        place, above, served_from = None, None, None
+        why: model.WhyNoStand | None = None if fits_on(support, task.box) else "too_small"
+        if why is None and support.height >= task.lowest - 1e-9:
             part, found = _on_support(robot, support, task, plan, free)
             if found.chosen:
                 (served,) = listed(part, found)
@@ -251,13 +251,6 @@ def _placed(
         replace(placed, places=listed(task, placement), stands=tuple(stands)),
         model.places(placement.best_turns),
     )
-
-
-def _why_not(support: Support, task: Task) -> model.WhyNoStand | None:
-    """What of a support alone keeps the box from standing on it."""
-    if support.height < task.lowest - SAME_HEIGHT:
-        return "too_low"
-    return None if fits_on(support, task.box) else "too_small"
 
 
 def _on_support(

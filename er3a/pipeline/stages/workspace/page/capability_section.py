@@ -134,7 +134,7 @@ def _placement_context(placement: model.Placement) -> dict[str, Any]:
     return {
         "nowhere": "",
         "placing_margin": fixed(placement.margin_mm, 0),
-        "stands": [stand_text(stand, placement) for stand in placement.stands],
+        "stands": [stand_text(each, placement) for each in placement.stands if each.place or each.why_none],
     }
 
 
