@@ -489,7 +489,7 @@ def surface_distance(  # noqa: C901, PLR0912
     Parameters
     ----------
     a, b : numbers of the bodies; b is a surface, or a convex core if it has no tree or is -1
-    T, S : (4, 4), m, place the two surfaces; S does not count for a core
+    T, S : (4, 4), m, place the two bodies; the core is boxed along the axes of S
     core : points (P, 3) in space, m, first and last row of the core (the last excluded), and the radius of its disc, m
     room : (ROOM, 3), scratch memory
     near : (2, 3), m, gets their closest points, if they are nearer than ``far``
@@ -506,7 +506,7 @@ def surface_distance(  # noqa: C901, PLR0912
     points, M, back = np.empty((3 + count, 3)), np.eye(3, 4), np.empty((3, 4))
     stack, bound, seen, turn = np.empty((WAITING, 2), np.int64), np.empty(WAITING), np.zeros((5, 3)), np.empty((4, 3))
     if convex:
-        _core_in_frame(T, core, points, seen)
+        _core_in_frame(T, S, core, points, seen)
         within = least == 0 and _around(trees, trees.root[a], _moved(M, points, 3)) != 0
     else:
         _frame_seen(S, T, back)
@@ -566,18 +566,26 @@ def surface_distance(  # noqa: C901, PLR0912
 
 
 @borrowing_kernel
-def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], points: Reals, box: Reals) -> None:
-    """The points of a core in a surface's frame, from row 3 of ``points`` on, and the box (5, 3) around it."""
+def _core_in_frame(T: Reals, S: Reals, core: tuple[Reals, int, int, float], points: Reals, box: Reals) -> None:
+    """The points of a core in a surface's frame, from row 3 of ``points`` on, and the box (5, 3) around it, along the
+    axes of S: a table, or a link, is as thin as that along its own."""
     w, first, last, disc = core
+    x, y, z = -T[0, 3], -T[1, 3], -T[2, 3]
     for r in range(3):
         low, high = np.inf, -np.inf
-        for p in range(last - first):
-            value = 0.0
+        for p in range(first, last):
+            points[3 + p - first, r] = 0.0
             for k in range(3):
-                value += T[k, r] * (w[first + p, k] - T[k, 3])
-            points[3 + p, r] = value
-            low, high = min(low, value), max(high, value)
-        box[0, r], box[1, r], box[2 + r, r] = (low + high) / 2, (high - low) / 2 + disc, 1.0
+                points[3 + p - first, r] += T[k, r] * (w[p, k] - T[k, 3])
+            along = w[p, 0] * S[0, r] + w[p, 1] * S[1, r] + w[p, 2] * S[2, r]
+            low, high = min(low, along), max(high, along)
+        middle = (low + high) / 2
+        x, y, z = x + middle * S[0, r], y + middle * S[1, r], z + middle * S[2, r]
+        box[1, r] = (high - low) / 2 + disc
+        for c in range(3):
+            box[2 + r, c] = T[0, c] * S[0, r] + T[1, c] * S[1, r] + T[2, c] * S[2, r]
+    for c in range(3):
+        box[0, c] = T[0, c] * x + T[1, c] * y + T[2, c] * z
 
 
 @borrowing_kernel
