@@ -145,7 +145,8 @@ RIGHT_WITHIN = 1e-3  # rad and deg: right angles as printed with three decimals 
 
 
 def table_text(path: Path) -> str:
-    """The text of a file in UTF-8 or UTF-16, or of standard input for ``-``.
+    """The text of a file in UTF-8 or UTF-16, or of standard input for ``-``; a cell in another encoding can't be read,
+    a comment can be left out.
 
     Raises
     ------
@@ -153,7 +154,8 @@ def table_text(path: Path) -> str:
         if it is missing, too large or no text
     """
     pasted = str(path) == "-"
-    return text_of(path, _pasted() if pasted else given_bytes(path, MAX_BYTES, "Give the table without the rest"))
+    raw = _pasted() if pasted else given_bytes(path, MAX_BYTES, "Give the table without the rest")
+    return text_of(path, raw, errors="replace")
 
 
 @cache
@@ -381,7 +383,11 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
     (line, header), *rows = grid
     lists = [(each[1], re.findall(r"[^,;\s\"']+", each[2])) for each in _LISTS.finditer(text)]
     found = [each for each in lists if len(each[1]) > 1]  # not an element: offset = table[i]
-    own = "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == ["offset"])
+    own, thetas = (
+        "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == [name])
+        for name in ("offset", "theta")
+    )
+    of_links = re.search(r"(?s)SerialLink\(.*\boffset\s*=\s*\[[^\]]*\][;\s]", text) and not thetas.strip("0.")
     for name, cells in [("type", _JOINTS.findall(text)), *found]:
         quantities, said = quantities_of(header), {each.lower() for each in cells}
         of_types, of_signs = (re.search(words, name, re.I) for words in ("type|sigma", "sign|dir|polar|inv"))
@@ -393,7 +399,8 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
         whole = len(cells) == len(rows)
         if settled or not (whole or of_angles):
             continue
-        if of_signs or (not of_types and ({"theta", "offset"} & {*quantities} or not (of_angles and whole))):
+        added = (name == "offset" and of_links) or (of_angles and not {"theta", "offset"} & {*quantities})
+        if of_signs or not (of_types or (whole and added)):
             what = "directions" if of_signs else "offsets"
             raise InputError(
                 path,

@@ -188,12 +188,13 @@ def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> 
     return text_of(path, given_bytes(path, most, too_large), "utf-8-sig")
 
 
-def text_of(path: Path, raw: bytes, encoding: str = "") -> str:
+def text_of(path: Path, raw: bytes, encoding: str = "", errors: str = "strict") -> str:
     """The text that a file's bytes are.
 
     Parameters
     ----------
     encoding : by default UTF-8, or UTF-16 where a byte order mark says so, as spreadsheets write it
+    errors : ``replace`` puts the sign U+FFFD for what is in another encoding, such as comments
 
     Returns
     -------
@@ -205,7 +206,7 @@ def text_of(path: Path, raw: bytes, encoding: str = "") -> str:
         if they are in another encoding (with the number of the byte)
     """
     try:
-        text = raw.decode(encoding or ("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"))
+        text = raw.decode(encoding or ("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"), errors)
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", "not UTF-8 text", "Save the file as UTF-8") from None
     return text.replace("\r\n", "\n")

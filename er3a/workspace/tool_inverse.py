@@ -205,7 +205,9 @@ def generic_manipulability(robot: Robot, q: Reals, chosen: Flags) -> Reals:
     if not mask.all() and arm_solver(robot).chain.code != "scara":  # of a SCARA the other rows are 0
         R = forward(with_task_frame(robot), q[chosen])[:, :3, :3]
         J = np.concatenate([J[:, :3], R.swapaxes(-1, -2) @ J[:, 3:]], axis=1)[:, mask]
-    gram = J @ J.swapaxes(-1, -2) if J.shape[-2] <= J.shape[-1] else J.swapaxes(-1, -2) @ J
-    size = np.abs(np.linalg.det(J)) if J.shape[-2] == J.shape[-1] else np.sqrt(np.maximum(0.0, np.linalg.det(gram)))
-    found[chosen] = size
+    if J.shape[-2] != J.shape[-1]:
+        gram = J @ J.swapaxes(-1, -2) if J.shape[-2] < J.shape[-1] else J.swapaxes(-1, -2) @ J
+        found[chosen] = np.sqrt(np.maximum(0.0, np.linalg.det(gram)))
+    else:
+        found[chosen] = np.abs(np.linalg.det(J))
     return found

@@ -438,6 +438,23 @@ L_2 &= 270 \,\mathrm{mm}
     np.testing.assert_allclose(numbers(read(tmp_path, table)[0]), IRB120[:2], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "table", ["DH = [0 0.29 0 \x96pi/2; 0 0 0.27 0];\n", "|theta|d|a|alpha|\n|--|--|--|--|\n|q1|290|0|\x9690|\n"]
+)
+@pytest.mark.filterwarnings("ignore::er3a.InputWarning")
+def test_comments_in_another_encoding_are_left_out_and_cells_asked_back(tmp_path, table):
+    (tmp_path / "arm.m").write_bytes(f"% theta d a alpha \xb1\xe0\n{table}".encode("latin-1"))
+    with pytest.raises(InputError):
+        er3a.read_table(tmp_path / "arm.m")
+    (tmp_path / "arm.m").write_bytes(f"% \xb1\xe0 theta d a alpha\n{table}".replace("\x96", "-").encode("latin-1"))
+    assert er3a.read_table(tmp_path / "arm.m").alpha[0] == pytest.approx(-np.pi / 2)
+
+
+def test_the_offsets_of_a_toolbox_arm_are_added_to_its_matrix(tmp_path):
+    text = "DH = [0 0.29 0 -pi/2 0;\n 0 0 0.27 0 0];\nR = SerialLink(DH);\nR.offset = [0 -pi/2];\n"
+    np.testing.assert_allclose(numbers(read(tmp_path, text)[0]), IRB120[:2], atol=1e-9)
+
+
 def test_names_given_by_each_other_end():
     with pytest.raises(ValueError, match="deep"):
         amount_of("a", {"a": "b", "b": "a"})
@@ -918,7 +935,10 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
             " 'alpha', al(j));\nend",
             "loop",
         ),
-        ("DH=[0 0.29 0 -1.57 0;\n 0 0 0.27 0 0];\nR=SerialLink(DH);\nR.offset=[0 -pi/2];\n", "line 4: 'offset' may be"),
+        (
+            "DH=[0 0.29 0 -1.57 0;\n 0 0 0.27 0 0];\nR=SerialLink(DH);\nR.offset=[0 -90]*pi/180;\n",
+            "line 4: 'offset' may be",
+        ),
         ("% theta d a alpha\nDH=[0 0.29 0 -90;\n 0 0 0.27 0] .* [1 1 1 pi/180];\n", "row 2|line"),
         (f"# theta d a alpha\n{MATRIX}DH[1][2] = -0.5\n", "DH"),
         (f"# theta d a alpha\n{MATRIX}DH = np.vstack([DH, [0, 0, 0.1, 0]])\n", "changes 'DH'"),
