@@ -31,7 +31,7 @@ UNITS = words_of(
     "mm=mm 毫米=mm cm=cm dm=dm ft=ft gon=gon m=m 米=m metre=m meter=m metres=m meters=m in=in inch=in "
     "°=deg deg=deg degs=deg degree=deg degrees=deg grad=deg 度=deg rad=rad rads=rad radian=rad radians=rad"
 )
-_RADIANS = {"deg2rad", "radians", "d2r", "dtr", "torad"}
+_RADIANS = {"deg2rad", "degtorad", "deg_to_rad", "radians", "toradians", "d2r", "dtr", "torad"}
 _DEGREES = {"rad2deg", "degrees"}
 _FUNCTIONS: dict[str, Callable[..., float]] = {
     name: getattr(math, name.replace("arc", "a"))

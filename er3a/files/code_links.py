@@ -60,7 +60,7 @@ def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
         for k, cells in enumerate(made):
             name = f"{target}.{k}" if target and len(made) > 1 else target
             (own if order and not of_lists else rows).append(_Link(name, each.start, cells))
-        if toolbox and not (made or order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
+        if toolbox and not (made or order or re.fullmatch(r"[\w\s+-]*", each.inside)):  # no list of links
             unread.append(each)
     if "Frame::DH" in code.text:
         _segments(code, rows)

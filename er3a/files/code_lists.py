@@ -178,6 +178,8 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
     whole = [one for _, one in sorted(spellings.items()) if {*quantities_of(one)} >= {"alpha", "a", "d"}]
     if not whole:
         return
+    if end := re.search(r"(?i)\b(?:DH_)?d_?g\s*[=:]\s*[\d.]+", text):  # d of a gripper
+        code.refuse(end.start(), end[0], "belongs to no joint", "Number it as a row after the joints, or leave it out")
     found = whole[-1] | whole[0]
     if any(mark == ":" for _, mark, _ in found.get("q", {}).values()):
         found.pop("theta", None)  # what the program computes for a pose

@@ -56,7 +56,7 @@ _STARRED = re.compile(r"^\*$|\w\^?\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
 _NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
 _KINDS = words_of(
-    "r=revolute 0=revolute rot=revolute rotational=revolute rotary=revolute 旋转=revolute "
+    "r=revolute 0=revolute continuous=revolute rot=revolute rotational=revolute rotary=revolute 旋转=revolute "
     "p=prismatic 1=prismatic linear=prismatic 移动=prismatic"
 )
 _KIND_SAID = re.compile(r"(revolute|prismatic)\W?\s*[:=]\s*([0-9])\b|\b([0-9])\s*[:=]\s*(revolute|prismatic)")
@@ -68,7 +68,7 @@ _KIND_ELSEWHERE = re.compile(
 )
 """A joint that slides, said outside the table."""
 _LISTS = re.compile(
-    r"\b((?:\w*offsets?(?:_[a-z]\w*)?)|th(?:eta)?_?0|"
+    r"\b((?:(?!link_?offset)\w*offsets?(?:_[a-z]\w*)?)|th(?:eta)?_?0|"
     r"\w*(?:types?|sigma|signs?|directions?|dirs?|polarity|inv_joints?))\s*(?:\[\d*\])?\s*[:=]"
     r"\s*[\w.(]*[\[{]([^\[\]{}]*[1-9a-z][^\[\]{}]*)[\]}]",
     re.I,

@@ -455,6 +455,17 @@ def test_the_offsets_of_a_toolbox_arm_are_added_to_its_matrix(tmp_path):
     np.testing.assert_allclose(numbers(read(tmp_path, text)[0]), IRB120[:2], atol=1e-9)
 
 
+def test_lists_named_as_books_name_the_parameters_are_columns_and_a_gripper_is_no_row(tmp_path):
+    lists = "linkTwist = [-pi/2; 0];\nlinkLength = [0; 270];\nlinkOffset = [290; 0];\n"
+    content, _ = read(tmp_path, f"% standard D-H\n{lists}h.link(k+1).Children = 1;\n")
+    assert [(row.a_mm, row.d_mm) for row in content.dh.rows] == [(0, 290), (270, 0)]
+    constants = ("A1 0", "A2 0.27", "D1 0.29", "D2 0", "ALPHA1 -PI/2", "ALPHA2 0")
+    defines = "".join(f"#define DH_{each}\n" for each in constants)
+    assert len(read(tmp_path, defines)[0].dh.rows) == 2
+    with pytest.raises(InputError, match="DH_DG"):
+        read(tmp_path, f"{defines}#define DH_DG 0.303\n")
+
+
 def test_names_given_by_each_other_end():
     with pytest.raises(ValueError, match="deep"):
         amount_of("a", {"a": "b", "b": "a"})
