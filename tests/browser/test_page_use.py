@@ -104,7 +104,8 @@ const silent = [];
 let count = 0;
 for (const image of document.querySelectorAll("img[data-axes]")) {
   const answers = new Answers(image);
-  const { left, top, w, h } = answers.edges();
+  const place = image.getBoundingClientRect();
+  const { x: left, y: top, width: w, height: h } = drawnPart(image, place.left, place.top);
   for (const { box } of answers.axes) {
     const [u, v] = [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2];
     const lines = answers.at({ clientX: left + u * w, clientY: top + (1 - v) * h }).map(({ text }) => text);
