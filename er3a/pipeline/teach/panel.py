@@ -239,6 +239,18 @@ def _home(study: Study, name: str) -> Reals | None:
     return meant(robot, np.array(waiting)) if len(waiting) == robot.joints else home
 
 
+def _opened_at(robot: Robot, scene: Scene | None, near: NearSingular, known: list[Reals]) -> Reals:
+    """The first joint values (n,) that are clear and regular: those known, then others within the limits."""
+    middle, steps = (robot.lower + robot.upper) / 2, np.diag(robot.upper - robot.lower) / 4
+    tried = middle + steps
+    regular = tried[conditioning(robot, tried).smallest_singular_value.argsort()[::-1]]
+    rows = np.clip(
+        [*known, *regular, *(middle - steps[:, None] - steps).reshape(-1, robot.joints)], robot.lower, robot.upper
+    )
+    found: Reals = rows[(Bodies(robot, scene).free(rows, NEAR_TOUCH) & ~near.contains(robot, rows)).argmax()]
+    return found
+
+
 def write_panel(
     robot: Robot,
     output: Path,
@@ -272,14 +284,7 @@ def write_panel(
     head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
-    middle, steps = (robot.lower + robot.upper) / 2, np.diag(robot.upper - robot.lower) / 4
-    tried = middle + steps
-    regular = tried[conditioning(robot, tried).smallest_singular_value.argsort()[::-1]]
-    known = [q for q in (home, robot.home) if q is not None]
-    rows = np.clip(
-        [*known, *regular, *(middle - steps[:, None] - steps).reshape(-1, robot.joints)], robot.lower, robot.upper
-    )
-    opened = rows[(Bodies(robot, scene).free(rows, NEAR_TOUCH) & ~near.contains(robot, rows)).argmax()]
+    opened = _opened_at(robot, scene, near, [q for q in (home, robot.home) if q is not None])
     solids = drawn_scene(scene.solids if scene else (), robot)
     others = [arm for arm in (right,) if arm is not None and arm.joints == robot.joints]
     seen = {"scene": solids, "size": own["size"]}
