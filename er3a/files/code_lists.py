@@ -35,7 +35,7 @@ _NAMED = re.compile(
     (?:\[(?:\d*|[A-Z]\w*)\]|\(1:\w+\))?\s*                 # C's a[6] or a[N], MATLAB's a(1:6)
     (?::(?:[ ]*\[\w+;[ ]*\d+\][ ]*|[^=:\n"'\d]*)(?==))?   # its type: Rust's a: [f64; 6] =, Python's a: list =
     (?P<mark>[=:])\s*
-    (?:[\w.]+\(\s*|np\.r_\s*|c|\[[\d.]*\]\w+)?["']?$      # np.array(, np.r_, R's c(, Go's []float64
+    (?:[\w.]+\(\s*|np\.r_\s*|c|\[[\d.]*\]\w+)?["']?\s*$   # np.array(, np.r_, R's c(, Go's []float64
     """,
     re.VERBOSE,
 )
@@ -194,7 +194,8 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
         _, mark, place = entries[max(entries)]
         of_link = quantities["alpha" if place_of(name) in ("alpha", "a") else "d"]
         first = min(entries) if len(entries) == len(of_link) else min(of_link)
-        gaps = {*range(first, max(entries) + 1)} - {*entries}
+        last = max([*entries, *(of_link if place_of(name) == "theta" else ())])
+        gaps = {*range(first, last + 1)} - {*entries}
         cells |= {k: f"{name}{k}" for k in gaps}  # what is not replaced stays a variable
         before = "(i-1)" if min(of_link) < max(map(min, found.values())) else ""
         yield name + before, [cells[k] for k in sorted(cells)], code.line(place), mark

@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
+from itertools import permutations
 
 from er3a.errors import InputError
+from er3a.files.arithmetic import plain
 from er3a.files.code_brackets import groups_of, parts
 from er3a.files.program_text import PART, Cells, Code, filled, rows_of
 from er3a.files.table_cells import Grid, Words
@@ -82,19 +84,22 @@ def _columns_in(texts: Iterable[str], width: int) -> Words:
     """The names of columns that texts hold one after the other; [] if they hold several orders."""
     found: dict[str, Words] = {}
     for text in texts:
+        text = plain(text)
         text = re.sub(r"(?<=,)(\s*)_(?=,|$)", r"\1theta", re.sub(r"\b(?:joint_?)?type\b", "sigma", text))
         text = re.sub(
             r"(?<=\w)\s*[(\[]\s*(?:(mm|cm|m|in)|deg|rad|°)\s*[)\]](?!.*\|)",  # a table in a comment has its own rows
             lambda each: f"_{each[1]}" * bool(each[1]),
             text,
         )
-        text = re.sub(r"(?<=\w)\s*[({_]*\s*i\s*-\s*1\s*[)}]*", "_i-1", text)
-        text = re.sub(r"(?<=\w)(?:\s*\(\s*i\s*\)|\s+i(?=\s*,|$))", "_i", text)
+        text = re.sub(r"(?<=\w)\s*[(\[{_]*\s*i\s*-\s*1\s*[)\]}]*", "_i-1", text)
+        text = re.sub(r"(?<=\w)(?:\s*[(\[]\s*i\s*[)\]]|\s+i(?=\s*,|$))", "_i", text)
         words = re.split(r"(?:[\s,;|\[\]()→]|->|\band\b|(?<!\w)-(?!\w))+", text)
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
-        # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
+        # All that it names, of which the row's number is no column, nor theta of three; theta and its offset are two
+        # mentions of one.
         names = next((each for each in windows if names_columns(each, once=len(each) > width)), [])
-        names = names if len(names) == width else [name for name in names if place_of(name) != "joint"]
+        others = "joint", "theta" if width == len(_WITHOUT_THETA) else ""
+        names = names if len(names) == width else [name for name in names if place_of(name) not in others]
         if len(names) == width:
             found.setdefault(" ".join(map(place_of, names)), names)
     return next(iter(found.values())) if len(found) == 1 else []
@@ -117,7 +122,53 @@ def _indexed(code: Code) -> Iterator[str]:
 def names_columns(names: Words, *, once: bool = False) -> bool:
     """Whether names are those of a D-H table's columns, each once; with ``once`` theta and its offset count as one."""
     quantities = {name.replace("offset", "theta") if once else name for name in quantities_of(names)}
-    return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
+    return len(quantities) == len(names) and quantities >= _WITHOUT_THETA
+
+
+_WITHOUT_THETA = {"a", "alpha", "d"}
+
+
+_OF_JOINT = re.compile(r"(?<![a-z])(?:q|th(?:eta)?|θ)[_\[({]*\d", re.I)
+_RIGHT_ANGLE = re.compile(
+    r"[-+()\s]*(?:[\d.]+\*)?(?:\w+\.)?(?:\w*pi\b|π)[\s()/\d._]*|[-+]?(?:90|180|270|1\.57\d*|3\.14\d*)(?:\.0*)?f?",
+    re.I,
+)
+_NOTHING = re.compile(r"[-+]?0*\.?0*f?")
+_PARALLEL = re.compile(r"[-+]?(?:0*\.?0*f?|(?:\w+\.)?(?:\w*pi|π)|180(?:\.0*)?|3\.14\d*)", re.I)
+
+
+def only_order(rows: Grid) -> Words:
+    """The order of four columns without names, if there is one alone in which no two joints turn about one line.
+
+    Two joints do if both length and twist between them are 0: of standard tables in all rows but the last, of modified
+    ones in all but the first.
+
+    Returns
+    -------
+    names : [] if no order, or several, are possible
+    """
+    columns = [*zip(*(cells for _, cells in rows))]
+    if len(columns) != len(_ROLES):
+        return []
+    named = [[bool(_OF_JOINT.search(cell)) for cell in column] for column in columns]
+    none = [[bool(_NOTHING.fullmatch(cell)) for cell in column] for column in columns]
+    right = [[bool(_RIGHT_ANGLE.fullmatch(cell)) for cell in column] for column in columns]
+    in_pi = [bool(re.search(r"pi\b|π", " ".join(column), re.I)) for column in columns]
+    turned = [all(x or y or z for x, y, z in zip(*each)) for each in zip(named, none, right)]
+    found = []
+    for a, alpha, d, theta in permutations(range(len(_ROLES))):
+        lengths = not (all(none[a]) or all(none[d]) or any(named[a]) or in_pi[a] or in_pi[d])
+        angles = turned[alpha] and turned[theta] and any(right[alpha]) and not any(named[alpha])
+        links = zip(none[a], columns[alpha], named[d])
+        one_line = [bool(blank and _PARALLEL.fullmatch(twist) and not slides) for blank, twist, slides in links]
+        apart = not any(one_line[:-1]) or not any(one_line[1:])
+        if lengths and angles and sum(named[d]) <= sum(named[theta]) and apart:
+            found.append((a, alpha, d, theta))
+    order = dict(zip(found[0], _ROLES)) if len(found) == 1 else {}
+    return [order[k] for k in sorted(order)]
+
+
+_ROLES = "a", "alpha", "d", "theta"
 
 
 KDL = "DH", "DH_Craig1989"

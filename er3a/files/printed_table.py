@@ -23,12 +23,12 @@ from er3a.by_value import frozen
 from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import CALLED, TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain, words_of
 from er3a.files.code_lists import Lists
-from er3a.files.column_order import LIBRARIES, program
+from er3a.files.column_order import LIBRARIES, only_order, program
 from er3a.files.csv_file import Lines
-from er3a.files.program_text import Cells, Code
+from er3a.files.program_text import BLOCK, Cells, Code
 from er3a.files.table_cells import MARKS, Grid, Words, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import code_grids
-from er3a.files.table_headings import Heading, heading_of, quantities_of
+from er3a.files.table_headings import Heading, heading_of, place_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
 from er3a.robots.robot import CONVENTIONS, Convention
@@ -70,10 +70,11 @@ _KIND_ELSEWHERE = re.compile(
 _LISTS = re.compile(
     r"\b((?:(?!link_?offset)\w*offsets?(?:_[a-z]\w*)?)|th(?:eta)?_?0|"
     r"\w*(?:types?|sigma|signs?|directions?|dirs?|polarity|inv_joints?))\s*(?:\[\d*\])?\s*[:=]"
-    r"\s*[\w.(]*[\[{]([^\[\]{}]*[1-9a-z][^\[\]{}]*)[\]}]",
+    r"\s*([\w.(]*)[\[{]([^\[\]{}]*[1-9a-z][^\[\]{}]*)[\]}]",
     re.I,
 )
-"""A list of offsets, of types, or of directions."""
+"""A list of offsets, of types, or of directions, and a call that its elements are in."""
+_CONVERTED = "deg2rad(", "np.deg2rad(", "radians(", "np.radians("
 _TYPES = {*words_of("r p revolute prismatic fixed")}
 _JOINTS = re.compile(r"Joint\([^;\n]*[\"'](revolute|prismatic|fixed)[\"']")
 SIGNS = {
@@ -125,6 +126,8 @@ _IN_UNIT = re.compile(
 )
 """What lengths are in, as a text says it."""
 _LENGTH_UNIT = re.compile(r"(?<![\w.])(mm|cm|m(?!\s*=)|inch|[Mm]et(?:er|re)s?)\b")
+_PLACED = r"\b(?:base|tool)(?:\s*=(?!=)|[\"']\s*,)[ \t]*(?![\s\"'\]})]|None|eye\(|SE3\(\)|transl\([0., ]*\))"
+"""A base or tool that is put somewhere, other than at nothing."""
 _CALL = re.compile(r"(?:\w+\.)*(\w+)\([\w.,\[\] ]*[^\W\d][\w.,\[\] ]*\)\s*")
 """A call of a function of names, whose value nobody knows."""
 
@@ -197,6 +200,9 @@ def printed_table(
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
     tables = [*{str([row for _, row in table]): table for table in found[:9]}.values()]
+    tables = [table for table in tables if "theta" in map(place_of, table[0][1])] or tables
+    if re.search(r"\bsym(?:s|bols?)\b", text):  # of one with numbers and one with their names
+        tables = [table for table in tables if _lengths(table) - {"", "1"}] or tables
     if not tables:
         return None
     tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]
@@ -208,11 +214,15 @@ def printed_table(
 
 def _differ(one: Grid, other: Grid) -> bool:
     """Whether each of two tables has a length that the other lacks, in whatever unit: their digits are compared."""
-    found = []
-    for (_, header), *rows in (one, other):
-        own = (cell for _, row in rows for name, cell in zip(header, row) if quantities_of([name]) in (["a"], ["d"]))
-        found.append({each.strip("0") for each in re.findall(r"(?<!\w)\d+", " ".join(own).replace(".", ""))})
-    return bool(found[0] - found[1] and found[1] - found[0])
+    first, second = _lengths(one), _lengths(other)
+    return bool(first - second and second - first)
+
+
+def _lengths(table: Grid) -> set[str]:
+    """The digits of a table's lengths without zeros at their ends."""
+    (_, header), *rows = table
+    own = (cell for _, row in rows for name, cell in zip(header, row) if quantities_of([name]) in (["a"], ["d"]))
+    return {each.strip("0") for each in re.findall(r"(?<!\w)\d+", " ".join(own).replace(".", ""))}
 
 
 def table_in(path: Path) -> bool:
@@ -251,6 +261,10 @@ def nearest_headings(text: str) -> str:
     return f"line {line} has headings of {', '.join(found)}, and lacks {missing}" if len({*found}) > 1 else ""
 
 
+_UNNAMED = -1
+"""The line of headings that no text has."""
+
+
 # Where the table is ---------------------------------------------------------------------------------------------------
 
 
@@ -267,7 +281,11 @@ def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
         except InputError:
             if not found:
                 raise
-    if not found and (bare := code_grids(text, headed=False)):
+    bare = [] if found else code_grids(text, headed=False)
+    orders = [(order, grid) for grid in bare if (order := only_order(grid))]
+    if len(orders) == 1:
+        return [([[(_UNNAMED, order), *grid] for order, grid in orders], True)]
+    if bare:
         problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
@@ -381,13 +399,13 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
     """A program's table with a separate list of types as a column, and one of offsets if no theta is in the table; a
     list of directions is asked back, as an offset may be added before or after."""
     (line, header), *rows = grid
-    lists = [(each[1], re.findall(r"[^,;\s\"']+", each[2])) for each in _LISTS.finditer(text)]
+    lists = [
+        (name, [f"{call}{cell})" if call in _CONVERTED else cell for cell in re.findall(r"[^,;\s\"']+", cells)])
+        for name, call, cells in _LISTS.findall(text)
+    ]
     found = [each for each in lists if len(each[1]) > 1]  # not an element: offset = table[i]
-    own, thetas = (
-        "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == [name])
-        for name in ("offset", "theta")
-    )
-    of_links = re.search(r"(?s)SerialLink\(.*\boffset\s*=\s*\[[^\]]*\][;\s]", text) and not thetas.strip("0.")
+    own = "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == ["offset"])
+    of_links = re.search(r"(?s)SerialLink\(.*\boffset\s*=\s*(?:\[[^\]]*\]|\w+)[;\s]", text)
     for name, cells in [("type", _JOINTS.findall(text)), *found]:
         quantities, said = quantities_of(header), {each.lower() for each in cells}
         of_types, of_signs = (re.search(words, name, re.I) for words in ("type|sigma", "sign|dir|polar|inv"))
@@ -423,9 +441,14 @@ class _Table:
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool, convention: Convention | None):
         self.path, self.notes, self.unsaid = path, Words(), set[str]()
         of_words = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
-        self.text = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", of_words) if from_code else without_latex(plain(of_words))
+        without_comments = re.sub(r"(?m)^[ \t]*(?:[%#]|//).*$", "", BLOCK.sub("", of_words))
+        self.text = without_comments if from_code else without_latex(plain(of_words))
         grid = _with_lists(path, self.text, grid) if from_code else grid
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
+        if grid[0][0] == _UNNAMED:
+            order = ", ".join(self.header)
+            why = "in other orders two joints turn about one line"
+            self.notes.append(f"columns without names were read as {order}: {why}")
         for line, cells in self.rows:
             if len(cells) != len(self.header):
                 raise InputError(
@@ -440,12 +463,12 @@ class _Table:
         labels = [k for k, own in found.items() if own.quantity == "joint"]
         self.headings = {k: own for k, own in found.items() if k not in labels[1:]}
         self.column = dict[str, int]()
+        self.of_toolbox = from_code and bool(re.search(r"\bSerialLink\(|\bLink\(\[", self.text))
         self.given = self._given(Lists(program(text)) if from_code else None)
         self._check_headings()
         self.convention = self._stated(program(text) if from_code else None, text, convention)
         # Below its print the Robotics Toolbox writes both, as translations t.
-        placed = r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)" if from_code else r"\b(?:base|tool)\W+t\s*="
-        if re.search(placed, text):
+        if re.search(_PLACED if from_code else r"\b(?:base|tool)\W+t\s*=", text):
             self.notes.append("base and tool of the text are not read")
         self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.lengths = self._said_unit(text)
@@ -525,7 +548,9 @@ class _Table:
         found: Cells = {}
         for name, value, unit in given:
             made = _CALL.fullmatch(value)
-            if not re.search(r"[\"']|\[(?!\d+\])|\(\)$", value) and (made is None or made[1] in CALLED):
+            if made and made[1] not in CALLED and name in found:
+                found[name] = TWO_VALUES
+            elif not re.search(r"[\"']|\[(?!\d+\])|\(\)$", value) and (made is None or made[1] in CALLED):
                 value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
                 value = lists.resolved(value) if lists else value
                 found[name] = value if found.get(name, value) == value else TWO_VALUES
@@ -739,7 +764,9 @@ class _Table:
         turning = [None if slides else each for slides, each in zip(sliding, found)]
         rows = zip(self.columns["joint"], turning, self.rows)
         offsets = [f"joint {n} {cells[k].strip()}" for n, each, (_, cells) in rows if n and each and each.number]
-        if "offset" not in self.column:
+        if self.of_toolbox and offsets:
+            self.notes.append(f"theta is not read, as the Robotics Toolbox ignores it: {', '.join(offsets)}")
+        elif "offset" not in self.column:
             if not any(each.variables for each in found):
                 self._check_pose(k)
             self._add(k, "offset", turning)
@@ -750,7 +777,7 @@ class _Table:
                 None,
                 k,
                 f"{offsets[0]}, and there are offsets too",
-                "Add it to the offset, or leave it out if the table is the Robotics Toolbox's, which ignores it",
+                "Add it to the offset, or leave it out",
             )
         if any(sliding):
             self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])

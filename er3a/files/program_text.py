@@ -20,7 +20,7 @@ _COMMENT = re.compile(
 )
 
 
-_BLOCK = re.compile(
+BLOCK = re.compile(
     r"(?ms)^[ \t]*%\{[ \t]*$.{0,5000}?^[ \t]*%\}|\"\"\".{0,5000}?\"\"\"|\'\'\'.{0,5000}?\'\'\'|/\*.{0,5000}?\*/"
     r"|\(\*\s.{0,5000}?\s\*\)"
 )
@@ -54,9 +54,9 @@ class Code:
 
     def __init__(self, text: str):
         self.comments, self.conventions = dict[int, str](), set[str]()
-        for block in _BLOCK.finditer(text):
+        for block in BLOCK.finditer(text):
             self.comments |= enumerate(block[0].split("\n"), 1 + text.count("\n", 0, block.start()))
-        text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), re.sub(r"\b(?:self\.|this->)", "", text))
+        text = BLOCK.sub(lambda found: "\n" * found[0].count("\n"), re.sub(r"\b(?:self\.|this->)", "", text))
         text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
         def kept(found: re.Match[str]) -> str:
@@ -131,7 +131,7 @@ def record_of(group: CodeGroup) -> Cells:
         return {}
     label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", group.before)
     # No colour, no column.
-    cells = {key: value for key, value in pairs_of(parts(group.inside)).items() if not re.match(r"[(\[].*,", value)}
+    cells = {key: value for key, value in pairs_of(parts(group.inside)).items() if not re.match(r"[(\[{].*,", value)}
     return ({"joint": label[1]} if label else {}) | cells
 
 

@@ -73,8 +73,8 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool, taken: set[str]) 
     joints = (
         r"\+=?\s*(?:q|th|θ|joint)" if re.search(r"(?i)(?<!\w)[\d.]*[1-9]|pi|π", " ".join(thetas)) else "q|th|θ|joint"
     )
-    used = {*re.findall(rf"\b{name}[\[(]\d+,\s*:", code.text)}
-    if is_matrix and 0 < len(used) < len(rows_of(code, group)):
+    used = {*re.findall(rf"\b{name}[\[(](\w+),\s*:", code.text)}
+    if is_matrix and all(map(str.isdigit, used)) and 0 < len(used) < len(rows_of(code, group)):
         code.refuse(group.start, name, "has rows that the program does not use", "Leave them out")
     of_name = _SET.replace("NAME", name).replace("JOINTS", joints)
     for change in [*_MOVED.finditer(group.before), *re.finditer(of_name, code.text)]:
@@ -94,7 +94,7 @@ in the same units."""
 
 
 _TURNED = (
-    r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*)?[-+].*(?:pi|\d).*|"
+    r"(?m)^\s*(?:q|th|theta)\w*[\[(]\d[\])]\s*(?:=\s*[\w.]+[\[(]\d[\])]\s*[-+]|[-+]=).*(?:pi|\d).*|"
     r"^\s*((?:q|th|theta)\w*)\s*=\s*(?:\1|(?:q|th|theta)[a-z_]*)\s*[-+].*(?:pi\b|90|180).*"
 )
 

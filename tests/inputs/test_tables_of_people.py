@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import warnings
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -286,7 +287,8 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i,a (m),α (deg),d (m),t\n1,0,90,0.27,1\n2,0,0,0.2,0\n", "type"),
         ("i,α,d,θ,r\n1,90,270,θ1,300\n2,0,200,θ2,0\n", "--column"),  # Khalil's d is a
         ("i,a,alpha,d,theta\n1,a1,90,300,q1\n2,270,0,0,q2\n", "a1 = "),
-        ("L(1) = Link([0.5 0.3 0 pi/2]);\nL(2) = Link([0 0 0.3 0]);", "offsets"),
+        ("rows = [[q1, 290, 0, -pi/2], [q2, 270, 0, pi/2], [q3, 0, 70, 0]]", "no names"),
+        ("a1 = 0; a2 = 10\na2 = in_metres(a2)\n# a alpha d theta\nM = [[a1, pi/2, 1, 0], [a2, 0, 0, 0]]", "two values"),
         ("# d, a, alpha\nrows = [[0.3, 0, -pi/2],\n        [0, 0.3, 0]]\noffsets_left = [0, pi/2]", "offsets_left"),
         (
             "Name theta [rad] a [m] d [m] alpha [rad] Mass [kg]\nJoint 1 0 0 0.1 0 2.5\nJoint 2 0 0.4 0 0 3.5 1\n",
@@ -450,9 +452,21 @@ def test_comments_in_another_encoding_are_left_out_and_cells_asked_back(tmp_path
     assert er3a.read_table(tmp_path / "arm.m").alpha[0] == pytest.approx(-np.pi / 2)
 
 
-def test_the_offsets_of_a_toolbox_arm_are_added_to_its_matrix(tmp_path):
-    text = "DH = [0 0.29 0 -pi/2 0;\n 0 0 0.27 0 0];\nR = SerialLink(DH);\nR.offset = [0 -pi/2];\n"
-    np.testing.assert_allclose(numbers(read(tmp_path, text)[0]), IRB120[:2], atol=1e-9)
+@pytest.mark.parametrize("offset", ["R.offset = [0 -pi/2];", "offset = deg2rad([0 -90]);\nR.offset = offset;"])
+def test_the_offsets_of_a_toolbox_arm_are_added_to_its_matrix_and_its_theta_is_none(tmp_path, offset):
+    text = f"DH = [0 0.29 0 -pi/2 0;\n pi 0 0.27 0 0];\nR = SerialLink(DH);\n{offset}\n"
+    content, notes = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+    assert any("joint 2 pi" in each for each in notes)
+
+
+def test_four_columns_without_names_are_read_if_no_other_order_is_an_arm(tmp_path):
+    arm = [(q, shown(d), shown(a), si(alpha, True)) for q, (a, alpha, d, _) in zip(("q1", "q2", "q3"), IRB120)]
+    for order in permutations(range(4)):
+        rows = "],\n [".join(", ".join(row[k] for k in order) for row in [*arm, ("q4", "302", "0", "pi/2")])
+        content, notes = read(tmp_path, f"arm = Arm([[{rows}]])")
+        np.testing.assert_allclose(np.array(numbers(content))[:, [0, 2]], [row[0:3:2] for row in IRB120[:4]])
+        assert any("two joints" in each for each in notes)
 
 
 def test_lists_named_as_books_name_the_parameters_are_columns_and_a_gripper_is_no_row(tmp_path):
