@@ -16,7 +16,7 @@ from er3a.by_value import by_identity
 from er3a.geometry.transforms import exp_rotation
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.by_class import arm_solver, with_task_frame
-from er3a.kinematics.chain import axes_at_zero_theta
+from er3a.kinematics.chain import axes_at_zero_theta, constant_links
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
@@ -25,6 +25,7 @@ from er3a.workspace.directions import Roll, cone_directions, roll_of, tool_rotat
 AskedKind = Literal["directions", "tilts", "turns", "points"]
 _PARALLEL = 1e-9  # sine: rounding of tables that are exact
 _MIN_PLANAR = 3  # joints that place the tool in a plane and tilt it there
+_ALONG = 1 - 1e-6  # cosine: axes of files that round pi/2 to three decimals
 _TASK_TURNS = 36  # about a SCARA's axes, one for each 10 deg
 
 
@@ -208,6 +209,31 @@ def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
         roll = roll if roll.free else none
         return None if plane is None else AskedOrientations("tilts", roll, tool, axis, plane)
     return AskedOrientations("directions", roll_of(robot, rolls), tool, axis)
+
+
+def along_last_axis(robot: Robot) -> tuple[Robot, str]:
+    """A robot whose tool points along the axis of its last joint, as grippers are mounted.
+
+    Parameters
+    ----------
+    robot : whose file may give the flange an x or y axis there, as ROS's frames ``flange`` and ``ee_link`` have it
+
+    Returns
+    -------
+    robot : with its tool frame turned, z outward; the same where a tool is given or z is along that axis
+    name : of the flange's axis that is z there, "z" of the same robot
+    """
+    last = constant_links(robot)[-1]
+    axis, outward = last[2, :3], last[:3, :3].T @ last[:3, 3]
+    k = int(np.abs(axis).argmax())
+    if robot.slides[-1] or k == 2 or abs(axis[k]) < _ALONG or not np.array_equal(robot.tool, np.eye(4)):
+        return robot, "z"
+    z = axis * (np.sign(axis @ outward) or 1.0)
+    x = np.cross(np.eye(3)[(k + 1) % 3], z)
+    x /= np.linalg.norm(x)
+    turned = np.eye(4)
+    turned[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    return robot.replace(tool=turned), ("" if z[k] > 0 else "−") + "xy"[k]
 
 
 def _tilt_plane(robot: Robot, joints: int) -> TiltPlane | None:

@@ -11,15 +11,15 @@ from scipy.spatial.transform import Rotation
 from er3a.files.robot_library import load_robot
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.forward import jacobian
+from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import manipulability, map_capability
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
-from er3a.workspace.orientations import asked_of
-from testing.arms import arms, joints_within, placement
+from er3a.workspace.orientations import along_last_axis, asked_of
+from testing.arms import arms, joints_at_random, joints_within, placement
 from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm
 
 TURN = 2 * np.pi
@@ -117,6 +117,18 @@ def test_a_free_roll_reaches_what_some_roll_reaches(random):
         reached = inverse_batch(robot, T.reshape(-1, 4, 4)).within_limits.reshape(30, 72, 8).any(axis=(1, 2))
         assert told.reachability[cell, 0] == pytest.approx(reached.mean())
     assert 0 < told.reachability.min() < 1
+
+
+@pytest.mark.parametrize(("turn", "name"), [(("y", -90), "x"), (("x", 90), "y"), (("x", -90), "−y"), (("z", 40), "z")])
+def test_a_tool_points_along_the_last_axis_whatever_the_flanges_axes_are_called(turn, name, random):
+    robot = load_robot("irb120")
+    flange = robot.flange.copy()
+    flange[:3, :3] = flange[:3, :3] @ Rotation.from_euler(*turn, degrees=True).as_matrix()
+    found, said = along_last_axis(robot.replace(flange=flange))
+    q = joints_at_random(robot, random, 20)
+    assert said == name
+    np.testing.assert_allclose(forward(found, q)[:, :3, 2:], forward(robot, q)[:, :3, 2:], atol=1e-9)
+    assert np.linalg.det(forward(found, q[0])[:3, :3]) == pytest.approx(1)
 
 
 def test_a_moved_base_changes_no_number():

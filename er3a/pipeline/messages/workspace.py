@@ -58,8 +58,8 @@ TEXTS = texts(
             "and run again.[ No tool is given: repeat it with your tool's length.{bare:?}]"
         ),
         "box.sampled": (
-            "the tool, up to {cone:g}° from {axis}, reaches all points sampled above the tray's lowest "
-            "{served_from} mm; clearance was sampled, without tray and stand"
+            "the tool[ along the flange's {own}], up to {cone:g}° from {axis}, reaches all points sampled above the "
+            "tray's lowest {served_from} mm; clearance was sampled, without tray and stand"
         ),
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool out of ({direction:.2f, }) into the cone."
@@ -94,7 +94,8 @@ def reached_text(placement: model.PlacementSummary, served_from_m: float = 0.0) 
     axis, cone = placement.task.tool_direction, placement.task.cone_deg
     down = tuple(round(each, 6) for each in axis) == (0, 0, -1)
     along = tr("straight down") if down else f"({', '.join(f'{x:g}' for x in axis)})"
-    return sentence("box.sampled", axis=along, cone=cone, served_from=millimetres([served_from_m]))
+    own = None if placement.tool_axis == "z" else placement.tool_axis
+    return sentence("box.sampled", axis=along, cone=cone, served_from=millimetres([served_from_m]), own=own)
 
 
 def run_again_text(summary: Summary) -> str:

@@ -300,6 +300,7 @@ class PlacementSummary:
 
     ``scene`` is the title of what the arm may not touch there; None in open space. Nor may it touch itself.
     ``margin_mm`` is what it keeps from both. ``stands`` are the level surfaces of the scene, the highest first.
+    ``tool_axis`` is the flange's axis that the tool points along.
     """
 
     scene: str | None
@@ -311,6 +312,7 @@ class PlacementSummary:
     fitting: int
     places: tuple[PlaceSummary, ...]
     stands: tuple[StandSummary, ...] = ()
+    tool_axis: str = "z"
 
     @property
     def named_places(self) -> list[tuple[str, PlaceSummary]]:

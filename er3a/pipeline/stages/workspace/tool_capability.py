@@ -27,7 +27,7 @@ from er3a.robots.robot import Robot
 from er3a.workspace.capability import map_capability, overall, rings
 from er3a.workspace.cell_frame import cell_frame, is_quick
 from er3a.workspace.directions import RING, cone_directions
-from er3a.workspace.orientations import AskedOrientations, asked_of
+from er3a.workspace.orientations import AskedOrientations, along_last_axis, asked_of
 from er3a.workspace.placement import (
     MIXED,
     NO,
@@ -176,6 +176,7 @@ def tool_capability(
     margin : m, that the arm keeps from the scene and from itself where it serves the box
     proven : what is known of the reach; cells that are proven empty need not be asked
     """
+    robot, tool_axis = along_last_axis(robot)
     asked, lacks = asked_of(robot, settings.rolls), lacking_for_maps(robot)
     if lacks or asked is None:
         missing = (
@@ -202,6 +203,8 @@ def tool_capability(
         coarse=plan.coarse,
     )
     placement, places = _placed(robot, settings, task, plan, scene=scene, margin=margin)
+    if isinstance(placement, model.PlacementSummary):
+        placement = replace(placement, tool_axis=tool_axis)
     return ToolCapability(summary, placement, model.capability(middles, found, frame.bar > 0), places)
 
 
