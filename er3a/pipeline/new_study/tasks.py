@@ -23,7 +23,7 @@ from er3a.files.path_file import PathFile, ProgramPath
 from er3a.files.scene_file import SceneFile
 from er3a.files.target_file import TargetEntry
 from er3a.files.yaml_file import parse
-from er3a.geometry.transforms import rpy_of
+from er3a.geometry.transforms import rot_x, rpy_of
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Solutions, Target
@@ -38,6 +38,7 @@ from er3a.robots.joint_limits import limit_margin, shown, within
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import nearest
 from er3a.selection.select import refusals_of
+from er3a.workspace.orientations import along_last_axis
 
 POINTS_DRAWN = 4000
 JUDGED = 1000  # of them, for conditions of a target
@@ -52,7 +53,6 @@ LIMIT_MARGIN_RAD = np.radians(8.0)
 FULL_POSE = 6  # joints that it takes to hold any pose
 FINE_BELOW = 40.0  # deg or mm: joints of a smaller range are written in hundredths
 SINGULAR_MARGIN = 2.0  # times what the study calls near
-DOWN_DEG = [180.0, 0.0, 0.0]
 HEIGHTS, DISTANCES, ASIDE = (0.3, 0.4, 0.22), (0.6, 0.5, 0.7, 0.42), (0.0, 0.25, -0.25)  # of the reach
 STEPS = ((0, 1, 0), (0, 0, 1), (1, 0, 0), (0, -1, 0), (0, 0, -1), (-1, 0, 0))
 LENGTHS = (0.3, 0.2, 0.12, 0.06)  # of the reach
@@ -152,17 +152,14 @@ class Spot:
     written : the pose as target files write it: ``xyz_mm`` with ``rpy_deg`` in whole degrees, or ``q_deg``
     xyz_mm : the tool point
     label : of the solution's branch
+    down : whether the tool points straight down
     """
 
     written: dict[str, list[float]]
     xyz_mm: tuple[float, float, float]
     q: Reals
     label: str
-
-    @property
-    def down(self) -> bool:
-        """Whether the tool is asked to point straight down."""
-        return self.written.get("rpy_deg") == DOWN_DEG
+    down: bool = False
 
 
 class TaskSearch:
@@ -176,6 +173,8 @@ class TaskSearch:
 
     def __init__(self, robot: Robot, reach: SampledReach, scene: Scene, settings: TrajectorySettings) -> None:
         self.robot, self.reach, self.settings = robot, reach, settings
+        turned = np.linalg.inv(robot.tool) @ along_last_axis(robot)[0].tool
+        self.down_deg = (np.round(np.degrees(rpy_of(rot_x(np.pi) @ turned.T))) + 0.0).tolist()
         self.bodies = Bodies(robot, scene)
         self.task = planning_of(robot, settings, self.bodies)
         self.margin = settings.assumed_margin_mm / 1000 if arm_shapes(robot).assumed else 0.0
@@ -222,7 +221,7 @@ class TaskSearch:
         open_ = self._where_open(self.reach.q.mean(axis=0))
         for height, distance, share in product(HEIGHTS, DISTANCES, ASIDE):
             point = self.reach.radius * (distance * out + share * across + np.array([0.0, 0.0, height]))
-            yield {"xyz_mm": _millimetres(self.robot.base[:3, 3] + point), "rpy_deg": [*DOWN_DEG]} | open_
+            yield {"xyz_mm": _millimetres(self.robot.base[:3, 3] + point), "rpy_deg": [*self.down_deg]} | open_
 
     def _drawn(self) -> Iterator[dict[str, list[float]]]:
         """Poses of drawn joint values that meet all conditions: of arms with fewer than six joints the joint values.
@@ -258,7 +257,8 @@ class TaskSearch:
             return None
         x, y, z = (target.T[:3, 3] * 1000).tolist()
         written = {key: [*values] for key, values in written.items()}  # YAML would alias lists that several share
-        return Spot(written, (x, y, z), solutions.q[chosen], str(solutions.label[chosen]))
+        down = written.get("rpy_deg") == self.down_deg
+        return Spot(written, (x, y, z), solutions.q[chosen], str(solutions.label[chosen]), down)
 
     def _solutions(self, pose: dict[str, list[float]]) -> tuple[Solutions, Target]:
         target = parse(TargetEntry, {"name": "spot", **pose}, None).target(self.robot)
