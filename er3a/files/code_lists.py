@@ -51,7 +51,8 @@ def named_lists(code: Code) -> Iterator[NamedList]:
             r"^\.+$|[\[{:%]|(?<!\w)\([^()]*,|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(",
             re.sub(r"\w\[[^\[\]]*\]|\w+::", "q", closed_up(inside)),
         )
-        if named is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
+        no_list = group.bracket == "(" and not ("," in inside and re.search(r"=\s*c?$", group.before))
+        if named is None or rows or no_list:
             continue
         factor = re.findall(r"\A[)\s]*'?\s*([*/][^;,\n]+|=(?!=))?", code.text[group.end + 1 :])[0]
         if factor == "=":  # the type of what follows
@@ -172,6 +173,8 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
     text = text.replace(fields[0], "") if len({*fields}) == 1 else text  # of one record: dh.alpha(1) = pi
     for each in _NUMBERED.finditer(text):
         _, name, bracket, number, mark, value = each.groups()
+        if int(number) > MOST_ROWS:  # r11, r12, ... are a rotation's
+            continue
         for spelling in (f"{bracket}{name.isupper()}", "~"):  # D1 = 0.3; d(1) = D1
             entries = spellings.setdefault(spelling, {}).setdefault(name.lower(), {})
             entries.setdefault(int(number), (value.strip(), mark, each.start()))
@@ -204,6 +207,7 @@ def numbered_lists(code: Code) -> Iterator[NamedList]:
 _LOOP = re.compile(r"\bfor\b([^\n]*)")
 
 
+MOST_ROWS = 10  # joints that er3a models
 MOST_PASSES = 99  # more than any arm has links
 
 

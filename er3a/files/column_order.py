@@ -70,6 +70,10 @@ def order_of(code: Code, rows: Grid, before: str) -> Words:
     of_links = {tuple(name for name in order if place_of(name) != "theta") for order in signatures(code).values()}
     if width == 3 and len(of_links) == 1:  # theta is the function's other argument
         return [*of_links.pop()]
+    of_arm = re.findall(r"SerialLink\(\s*(\w+)\s*[,)]", code.text)
+    name = re.search(r"(\w+)\s*=\s*[\[{]?$", before)
+    if of_arm and name and name[1] not in of_arm:
+        return []
     taken = (order for library, (order, _) in LIBRARIES.items() if re.search(library, code.text) and width >= 4)
     return next((order.split(",")[:width] for order in taken), [])
 

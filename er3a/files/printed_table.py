@@ -144,6 +144,7 @@ class PrintedTable:
 
 MAX_BYTES = 200_000
 LONGEST_IN_M = 2.5  # a link of a robot; the same number of mm is none
+SMALLEST_DEG = 10.0  # of a twist without a unit
 RIGHT_WITHIN = 1e-3  # rad and deg: right angles as printed with three decimals or more
 
 
@@ -200,9 +201,8 @@ def printed_table(
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
     tables = [*{str([row for _, row in table]): table for table in found[:9]}.values()]
-    tables = [table for table in tables if "theta" in map(place_of, table[0][1])] or tables
-    if re.search(r"\bsym(?:s|bols?)\b", text):  # of one with numbers and one with their names
-        tables = [table for table in tables if _lengths(table) - {"", "1"}] or tables
+    ranks = [(_has_twists(table), "theta" in map(place_of, table[0][1])) for table in tables]
+    tables = [table for table, rank in zip(tables, ranks) if rank == max(ranks)]  # no colours, poses, symbols alone
     if not tables:
         return None
     tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]
@@ -216,6 +216,19 @@ def _differ(one: Grid, other: Grid) -> bool:
     """Whether each of two tables has a length that the other lacks, in whatever unit: their digits are compared."""
     first, second = _lengths(one), _lengths(other)
     return bool(first - second and second - first)
+
+
+def _has_twists(table: Grid) -> bool:
+    """Whether each twist of a table is 0, a multiple of 45 degrees, or an angle with its unit or of 10 degrees on."""
+    (_, header), *rows = table
+    for cell in (cell for _, row in rows for name, cell in zip(header, row) if quantities_of([name]) == ["alpha"]):
+        with suppress(ValueError):
+            found = amount_of(re.sub(r"(?<=[\d.])f\b|\b[a-z]\w*(?:::|\.)", "", cell))
+            size, off = abs(found.number), abs(math.remainder(found.number, math.pi / 4))
+            if not found.variables and (found.unit or not size or size > SMALLEST_DEG or off < RIGHT_WITHIN < size):
+                continue
+        return False
+    return True
 
 
 def _lengths(table: Grid) -> set[str]:

@@ -460,6 +460,21 @@ def test_the_offsets_of_a_toolbox_arm_are_added_to_its_matrix_and_its_theta_is_n
     assert any("joint 2 pi" in each for each in notes)
 
 
+@pytest.mark.parametrize(
+    "other",
+    [
+        "Q = [0 0 0 0 0; pi/4 -pi/2 0 0 0];",  # poses
+        "M.I = [0.001 0 0; 0 0.0009 0; 0 0 0.0005];",
+        "colours = [1 0 0; 0 1 0; 1 0 1];",
+        "D = (r^2 - a2^2) / (2*a2);",
+        "syms a2 d1 t1 t2 alpha1\n% theta d a alpha\nsymbols = [t1 d1 0 alpha1; t2 0 a2 0];",
+    ],
+)
+def test_other_matrices_of_a_program_are_no_second_table(tmp_path, other):
+    text = f"% [theta, d, a, alpha]\nDH = [0 0.29 0 -pi/2;\n 0 0 0.27 0];\n{other}\nR = SerialLink(DH);\n"
+    np.testing.assert_allclose(numbers(read(tmp_path, text)[0]), [(0, -90, 290, 0), (270, 0, 0, 0)], atol=1e-9)
+
+
 def test_four_columns_without_names_are_read_if_no_other_order_is_an_arm(tmp_path):
     arm = [(q, shown(d), shown(a), si(alpha, True)) for q, (a, alpha, d, _) in zip(("q1", "q2", "q3"), IRB120)]
     for order in permutations(range(4)):
