@@ -999,6 +999,7 @@ EXPANDING_S = 30  # the largest public ones take two
 UNBOUNDED = "Look for an expression without end, such as 9**9**9"
 ARGUMENTS = "Give its arguments: --xacro NAME:=VALUE"
 DECLARED = re.compile(r'<xacro:arg\b[^>]*?\bname="([^"]+)"')
+PLAIN_DEFAULT = re.compile(r'<xacro:arg\b[^>]*?\bname="([^"]+)"[^>]*?\bdefault="([^"$]*)"')
 NO_PACKAGE, PACKAGES = re.compile(r"Package not found: (\S+)"), "Keep that package in a folder beside the file's own"
 EXTRA = "Install it: pip install 'er3a[xacro]'; or expand the file elsewhere: xacro FILE > arm.urdf"
 
@@ -1025,7 +1026,8 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
             raise InputError(path, "--xacro", "the file holds no xacro macros", "Leave the arguments out")
         yield path
         return
-    expanded = _expanded(path, dict(_argument(path, each) for each in arguments))
+    # The name of the robot may be an argument that is declared only within it.
+    expanded = _expanded(path, dict(PLAIN_DEFAULT.findall(text)) | dict(_argument(path, each) for each in arguments))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, f"{robot_name(Path(named[1] if (named := NAMED.search(expanded)) else path.stem))}.urdf")
         file.write_text(expanded, encoding="utf-8")

@@ -407,6 +407,15 @@ def test_xacro_that_makes_no_arm_is_one_clear_error(tmp_path, text):
     assert "\n" not in str(caught.value)
 
 
+def test_a_robot_may_be_named_by_an_argument_that_it_declares(tmp_path):
+    pytest.importorskip("xacrodoc")
+    named = (
+        f'<robot name="$(arg name)" {XACRO.partition(" ")[2].partition(" ")[2]}<xacro:arg name="name" default="wrist"/>'
+    )
+    found = import_urdf(written(tmp_path, arm_text().replace('<robot name="r">', named)))
+    assert found.robot.name == "wrist"
+
+
 def test_what_other_readers_pass_over_is_no_obstacle(tmp_path):
     """Definitions of xacro that are left over, and prefixes that the file does not declare."""
     extra = '<xacro:property name="w" value="0.1"/><sensor:camera name="c"><a:b/></sensor:camera></robot>'
