@@ -68,7 +68,7 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
     """A table of columns by the names of their lists: ``a = [0, 0.27, ...]``, ``"a": [0, ...]``; theta is no pose."""
     columns: dict[str, NamedList] = {}  # heading, cells, line, the list's name
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
-        bare = re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s?)|s)$", "", name.strip("_"))
+        bare = re.sub(r"(?<=.)(?:_?(?:[Ll]ist|[Vv]ec(?:tor)?|[Vv]al(?:ue)?s?)|_dh|s)$", "", name.strip("_"))
         names = (name, re.sub(r"^t$", "theta", bare), bare.rpartition("_")[2])
         heading = next(filter(None, map(heading_of, names)), None)
         quantity = heading.quantity if heading else name
