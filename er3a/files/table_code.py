@@ -87,7 +87,8 @@ _SET = r"""(?mx)
     |NAME(?:\.(?:append|insert|extend|pop|reverse)\(
     |(?:\.\w+|[\[({][^\n=\])}]*[\])}])*[ \t]*-=                                    # NAME[1][0] -= q[1]
     |(?:\.\w+|[\[({][^\n=\])}]*[\])}])+(?!.*(?:JOINTS))[ \t]*[+*/]?=(?!=)[^\n;]*
-    |[ \t]*[+*/]?=(?!=)[ \t]*+(?!\w+\.NAME[ \t]*(?:[;,]|$))(?!(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\()[^\n;]*\bNAME\b.*))
+    |[ \t]*[+*/]?=(?!=)[ \t]*+(?!\w+\.NAME[ \t]*(?:[;,]|$))                    # a record's field of that name
+    (?!(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\()[^\n;]*\bNAME\b.*))
 """
 """A statement that puts something else than joints' values into a list, changes its length, or makes it anew of itself,
 in the same units."""

@@ -74,7 +74,7 @@ def table_tile(name: str, stored: Results) -> Tile | None:
 
 
 def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
-    """How many paths or programs of a robot pass, and the others, each with its bar over time.
+    """How many paths or programs of a robot pass, and the others, if any, each with its bar over time.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     said = answer(study.robot(name), results)
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
-    others = [row for row in rows if row.mark != "pass"]
+    others = [row for row in rows if row.mark != "pass"] or rows
     page = f"{name}/{found.stage}.html"
     asked = tr("Which {what} pass?", what=what)
     return Tile(asked, said.headline, sound, page, rows=others[:FEW], all=len(others), heading=said.rest)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -42,17 +43,21 @@ def motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
 
 def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
     """For each joint the arm at rest in the pose in which it holds most."""
-    return [
-        at_rest(
-            robot,
-            holding_name(each.joint),
-            q=meant(robot, np.array(each.q)),
-            loads=np.tile(each.all_there, (2, 1)),
-            marks=_weight(robot, results.summary.masses, each),
-            elevation=0.0,
+    found = []
+    for each in results.summary.holding:
+        marks = _weight(robot, results.summary.masses, each)
+        found.append(
+            at_rest(
+                robot,
+                holding_name(each.joint),
+                q=meant(robot, np.array(each.q)),
+                loads=np.tile(each.all_there, (2, 1)),
+                marks=marks,
+                elevation=0.0,
+                turned=_along_axis(robot, each) if marks else None,
+            )
         )
-        for each in results.summary.holding
-    ]
+    return found
 
 
 def hanging(
@@ -76,6 +81,13 @@ def hanging(
     ways = np.array([(poses[each.link] @ [*each.centre_mm, MM])[:3] / MM - at for each in links]).reshape(-1, 3)
     off = ways - np.outer(ways @ axis, axis)
     return links, at, np.array([each.mass_kg for each in links]), off
+
+
+def _along_axis(robot: Robot, held: HoldingTorque) -> float:
+    """By how much (rad) the eye is turned to look along a joint's level axis, on which the weight's lever is seen."""
+    axis = poses_at(robot, meant(robot, np.array(held.q)))[held.joint, :3, 2]
+    axis = axis * -np.sign(axis @ axes_of(AZIMUTH, 0.0)[2])
+    return math.remainder(math.atan2(axis[1], axis[0]) - AZIMUTH, 2 * math.pi)
 
 
 def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> list[Mark]:

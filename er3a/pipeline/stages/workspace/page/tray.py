@@ -77,8 +77,8 @@ class Tray:
 
     @property
     def place_text(self) -> str:
-        """Its centre where it is on a stand, or else what it is on."""
-        if self.floor is None:
+        """Its centre, or that it is in the air."""
+        if self.below is None:
             return whole_sentence(self.where)
         return tr("Tray: ({centre}) mm.", centre=millimetres(self.place.centre_m))
 
