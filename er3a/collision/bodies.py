@@ -5,6 +5,7 @@ The base is not paired with the scene: it does not move, and it is mounted on so
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import lru_cache
 from itertools import product
 
@@ -60,7 +61,7 @@ class Bodies:
     layout : the same as arrays, solids among the bodies
     """
 
-    def __init__(self, robot: Robot, scene: Scene | None) -> None:
+    def __init__(self, robot: Robot, scene: Scene | None, without: Collection[Pair] = ()) -> None:
         if not isinstance(scene, Scene | None):
             raise Er3aError(f"the scene is a {type(scene).__name__}; expected what er3a.load_scene returns")
         self.robot, self.scene = robot, scene
@@ -75,6 +76,8 @@ class Bodies:
         around = [(b, s) for s in solids for b in moving if frozenset((b.name, s.name)) not in allowed]
         found = zip(matrix.watched + more.watched, matrix.joined + more.joined)
         kept = [(pair, held) for pair, held in found if frozenset(body.name for body in pair) not in allowed]
+        kept = [(pair, held) for pair, held in kept if named_pair(*pair) not in without]
+        around = [pair for pair in around if named_pair(*pair) not in without]
         met = (*(pair for pair, _ in kept), *around)
         numbers = {link_label(k): k for k in range(robot.rows + 1)}
         self.in_error, self.coarse = (

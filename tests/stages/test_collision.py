@@ -12,6 +12,7 @@ import yaml
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import label_of
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
@@ -322,3 +323,25 @@ def test_open_space_leaves_the_arm_itself(tmp_path):
     assert found.scene is None
     assert found.of_scene.ratio == 1
     assert found.whole.ratio == found.of_itself.ratio < 1
+
+
+def test_a_pair_that_is_as_near_in_all_rows_is_named_once_and_hides_no_other(tmp_path):
+    """A floor just below the shoulder, around which the upper arm turns."""
+    floor = {"kind": "scene", "title": "Floor", "planes": [{"name": "floor", "normal": [0, 0, 1], "offset_mm": 200}]}
+    (tmp_path / "floor.yaml").write_text(yaml.safe_dump(floor))
+    study = study_with(tmp_path / "floor.yaml")
+    targets = yaml.safe_load(Path(study.entry(NAME).targets).read_text(encoding="utf-8"))
+    targets["targets"] = [each for each in targets["targets"] if each["name"] != "wrist_aligned"]
+    (tmp_path / "targets.yaml").write_text(yaml.safe_dump(targets))
+    content = study.model_dump()
+    content["robots"][NAME]["targets"] = str(tmp_path / "targets.yaml")
+    found = compute(Study.model_validate(content), NAME).summary
+    (steady,) = found.steady
+    assert label_of(steady.between) == "link_2/floor"
+    bodies = Bodies(load_robot(NAME), load_scene(tmp_path / "floor.yaml"))
+    for each in found.closest:
+        far = 1000 * bodies.counted(bodies.distances(np.radians(each.q_deg), np.arange(len(bodies.pairs))))
+        others = {label_of(pair): own for pair, own in zip(bodies.pairs, far) if pair != steady.between}
+        assert label_of(each.between) == min(others, key=others.get)
+        assert each.clearance_mm == pytest.approx(min(others.values()))
+        assert steady.least_mm - 1e-6 <= far[bodies.pairs.index(steady.between)] <= steady.most_mm + 1e-6

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from er3a.selection.select import refusals_of
 
 
 def target_clearances(
-    robot: Robot, bodies: Bodies, file: str
+    robot: Robot, bodies: Bodies, file: str, others: Bodies | None = None
 ) -> tuple[model.TargetClearances, list[model.Closest], tuple[Finding, ...]]:
     """Clearance of the solutions of all targets.
 
@@ -41,6 +41,7 @@ def target_clearances(
     ----------
     bodies : of the robot, and what it must not meet
     file : of the targets
+    others : whose distances are measured, those of ``bodies`` unless given, which solutions are chosen by
 
     Returns
     -------
@@ -54,7 +55,7 @@ def target_clearances(
         if the targets can't be read
     """
     tables, closest, blocked = [], [], []
-    targets = load_targets(file, robot)
+    targets, near = load_targets(file, robot), others or bodies
     for target in targets:
         solutions = inverse(robot, target.T, target.q_ref, self_motion_rows=True)
         if len(targets) > MANY_TARGETS:
@@ -62,7 +63,7 @@ def target_clearances(
         rows = np.flatnonzero(solutions.within_limits)
         if not rows.size:
             continue
-        distance, pair = bodies.min_distance_of_turns(solutions.q[rows])
+        distance, pair = near.min_distance_of_turns(solutions.q[rows])
         tables.append(
             model.TargetClearances.of(
                 target=target.name,
@@ -70,7 +71,7 @@ def target_clearances(
                 label=solutions.label[rows],
                 q_deg=shown(robot, solutions.q[rows]),
                 clearance_mm=distance * 1000,
-                between=[label_of(bodies.pairs[k]) if k >= 0 else "" for k in pair],
+                between=[label_of(near.pairs[k]) if k >= 0 else "" for k in pair],
             )
         )
         choice = regular_first(robot, solutions, target.q_ref, refusals_of(bodies, solutions))
@@ -84,7 +85,7 @@ def target_clearances(
             at = np.searchsorted(rows, chosen)
             if pair[at] >= 0:
                 closest.append(
-                    _closest(bodies, (target.name, "target", None), solutions.q[chosen], distance[at], pair[at])
+                    _closest(near, (target.name, "target", None), solutions.q[chosen], distance[at], pair[at])
                 )
     return model.TargetClearances.stacked(tables).of_joints(robot.slides), closest, tuple(blocked)
 
@@ -144,6 +145,7 @@ def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int)
 STAGE_NAME = "collision"
 CHECKS = 1  # points of a path checked between its samples to begin with; clearance adds what it needs
 SAMPLES_STREAM, PLACES_STREAM = 0, 1
+FEWEST_ROWS, STEADY_MM, STEADY_JOINTS = 3, 3.0, 3  # poses, a steady pair's change of clearance, joints between it
 HOMES = 64  # free joint vectors among which a home is chosen
 
 
@@ -160,7 +162,8 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     space = free_space.sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])
     places = free_space.find_places(bodies, space, settings.cells_across, settings.rounds, random)
-    targets, at_targets, blocked = target_clearances(robot, bodies, study.entry(name).targets)
+    file = study.entry(name).targets
+    targets, at_targets, blocked = target_clearances(robot, bodies, file)
     home_from, q_home = _home(bodies, study.home(name), space.q[space.free])
     at_home, depth = _overlap(bodies, q_home)
     if at_home is None:
@@ -169,13 +172,19 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             bodies, places, q_home, solved[bodies.free(solved)], settings.neighbours
         )
     motions = list(listed_motions(study.entry(name).paths, task_of(study, name), CHECKS))
-    paths, on_paths, first_touch = path_clearances(motions, bodies, settings.penetration_tolerance_mm / 1000)
+    tolerance = settings.penetration_tolerance_mm / 1000
+    paths, on_paths, first_touch = path_clearances(motions, bodies, tolerance)
     pairs, matrix, places_found = _pair_shares(bodies, space), _matrix(bodies), _places_summary(places)
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
     wrong = bodies.in_error and fact(
         "collision.shapes_overlap", pairs=bodies.in_error, count=TRIED, free_ratio=space.whole.value
     )
-    closest = (*at_targets, *on_paths)
+    shown_closest = closest = (*at_targets, *on_paths)
+    if steady := _steady(bodies, closest):
+        others = Bodies(robot, scene, [each.between for each in steady])
+        targets, again, _ = target_clearances(robot, bodies, file, others)
+        paths, on_the_way, _ = path_clearances(motions, others, tolerance)
+        shown_closest = (*again, *on_the_way)
     assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
     free = _free_space(space, places_found, at_targets, blocked, _colliding(motions, on_paths, first_touch)).but(
         shapes_assumed=assumed is not None
@@ -201,7 +210,8 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             penetration_tolerance_mm=settings.penetration_tolerance_mm,
             places=places_found,
             mounting=mounting,
-            closest=closest,
+            closest=shown_closest,
+            steady=tuple(steady),
             checked=_checked(study, name, covered, motions),
             assumed=(*_chosen(motions), *assumed_tool(robot), *covered.assumed),
         ),
@@ -211,6 +221,26 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         targets=targets,
         paths=paths,
     )
+
+
+def _steady(bodies: Bodies, closest: Sequence[model.Closest]) -> tuple[model.SteadyPair, ...]:
+    """The pairs with few joints between them that are as near in all rows, and nearer than the rest in some row."""
+    poses = meant(bodies.robot, np.reshape([each.q_deg for each in closest], (-1, bodies.robot.joints)))
+    links = np.array([body.link for body in bodies.all])  # -1 of solids
+    pairs = np.arange(len(bodies.pairs))
+    far = 1000 * np.array([bodies.counted(bodies.distances(q, pairs)) for q in poses]).reshape(-1, len(pairs))
+    met = np.isfinite(far).all(axis=0)
+    if len(poses) < FEWEST_ROWS or not met.any():
+        return ()
+    far, pairs = far[:, met], pairs[met]
+    low, spread = far.min(axis=0), np.ptp(far, axis=0)
+    joints = np.abs(links[bodies.layout.first] - links[bodies.layout.second])[met]
+    steady = (low > 0) & (spread <= STEADY_MM) & (joints <= STEADY_JOINTS)
+    if steady.all():
+        return ()
+    nearer = np.flatnonzero(steady & (low < far[:, ~steady].min(axis=1).max()))
+    order = nearer[np.argsort(low[nearer], kind="stable")]
+    return tuple(model.SteadyPair(bodies.pairs[pairs[k]], float(low[k]), float(low[k] + spread[k])) for k in order)
 
 
 def _free_space(

@@ -57,6 +57,15 @@ class Closest:
     to_mm: tuple[float, float, float]
 
 
+@frozen
+class SteadyPair:
+    """Two bodies that are as near in all targets' and paths' nearest poses, and how near they are there, mm."""
+
+    between: Pair
+    least_mm: float
+    most_mm: float
+
+
 HomeFrom = Literal["study", "zero", "chosen"]
 
 
@@ -70,6 +79,7 @@ class CollisionSummary(Summary):
     home_from : whether the study gives home, joints are at 0 there, or it was chosen
     home_deg : where places are to be joined to; None where home is not free of overlap
     proven_m : cells' witnesses are joined by moves that are proven free but for overlaps less deep than this
+    closest : but for ``steady`` pairs, which are left out of clearances of targets and paths, too
     """
 
     needs = ("self_collision", "scene_collision", "limits", *OF_MOTIONS)
@@ -86,6 +96,7 @@ class CollisionSummary(Summary):
     places: PlacesSummary
     mounting: tuple[Mounting, ...]
     closest: tuple[Closest, ...]
+    steady: tuple[SteadyPair, ...]
 
 
 class MatrixRows(Table):

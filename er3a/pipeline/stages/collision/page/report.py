@@ -79,6 +79,10 @@ def _answer(
     params = summary.verdict.finding.params
     shapes = summary.verdict.shapes
     lines = [0.0, *([shapes.margin_mm] if shapes else [])]
+    steady = [
+        ListRow("none", say(each.between), with_unit(f"{fixed(each.least_mm, 1)}–{fixed(each.most_mm, 1)}", "mm"))
+        for each in summary.steady
+    ]
     ends = [0.0, *(each.clearance_mm for each in closest)]
     span = min(ends), max(ends)
     ticks = [(float(np.interp(line, span, [0.0, 1.0])), fixed(line, 0)) for line in lines]
@@ -93,16 +97,19 @@ def _answer(
     caught = len(params.get("demonstrations", ()))
     due = len(rows) + blocked - caught - len(partly)
     headline = tr("{count} of {due} poses and paths clear.", count=len(clear + elsewhere), due=due)
+    least = [(each.clearance_mm, each.name) for each in closest]
+    least += [(each.least_mm, say(each.between)) for each in summary.steady]
     keys = [
-        (with_unit(fixed(each.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=each.name))
-        for each in closest
-        if each.clearance_mm >= 0
+        (with_unit(fixed(far, 1), "mm"), tr("least clearance: {name}", name=name))
+        for far, name in sorted(least)
+        if far >= 0
     ][:1]
     titled = (
         (tr("Collide"), hit),
         (tr("Clear, nearest first"), clear),
         (tr("Clear, but fail at Paths"), elsewhere),
         (tr("Clear as far as reached"), partly),
+        (tr("Always as near, left out above"), steady),
     )
     return Answer(
         headline,
