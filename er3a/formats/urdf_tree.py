@@ -411,7 +411,10 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
             break
         if active:
             passive += [joint.name for joint in moving if joint not in active]
-        if not moving and len(onward) > 1:
+        flanges = [joint for joint in onward if FLANGE.search(joint.child)]
+        if not moving and len(onward) > 1 and flanges:
+            onward = sorted(flanges, key=lambda joint: "tool0" not in joint.child)
+        elif not moving and len(onward) > 1:
             if any((joint.T_parent_joint != np.eye(4)).any() for joint in onward):  # else it is where each of them is
                 notes.append(f"several fixed frames follow {link}; it was taken as the flange")
             break
@@ -1000,6 +1003,7 @@ UNBOUNDED = "Look for an expression without end, such as 9**9**9"
 ARGUMENTS = "Give its arguments: --xacro NAME:=VALUE"
 DECLARED = re.compile(r'<xacro:arg\b[^>]*?\bname="([^"]+)"')
 PLAIN_DEFAULT = re.compile(r'<xacro:arg\b[^>]*?\bname="([^"]+)"[^>]*?\bdefault="([^"$]*)"')
+FLANGE = re.compile(r"(?:^|_)(?:tool0|flange)$", re.I)  # what ROS-Industrial calls it, the first as its maker has it
 NO_PACKAGE, PACKAGES = re.compile(r"Package not found: (\S+)"), "Keep that package in a folder beside the file's own"
 EXTRA = "Install it: pip install 'er3a[xacro]'; or expand the file elsewhere: xacro FILE > arm.urdf"
 

@@ -216,7 +216,8 @@ def along_last_axis(robot: Robot) -> tuple[Robot, str]:
 
     Parameters
     ----------
-    robot : whose file may give the flange an x or y axis there, as ROS's frames ``flange`` and ``ee_link`` have it
+    robot : whose file may give the flange another axis there, as ROS's frames ``flange`` and ``ee_link`` have x, or
+        one that points into the arm
 
     Returns
     -------
@@ -226,14 +227,14 @@ def along_last_axis(robot: Robot) -> tuple[Robot, str]:
     last = constant_links(robot)[-1]
     axis, outward = last[2, :3], last[:3, :3].T @ last[:3, 3]
     k = int(np.abs(axis).argmax())
-    if robot.slides[-1] or k == 2 or abs(axis[k]) < _ALONG or not np.array_equal(robot.tool, np.eye(4)):
+    z = axis * (np.sign(axis @ outward) or np.sign(axis[k]))
+    if robot.slides[-1] or z[2] > _ALONG or abs(axis[k]) < _ALONG or not np.array_equal(robot.tool, np.eye(4)):
         return robot, "z"
-    z = axis * (np.sign(axis @ outward) or 1.0)
     x = np.cross(np.eye(3)[(k + 1) % 3], z)
     x /= np.linalg.norm(x)
     turned = np.eye(4)
     turned[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    return robot.replace(tool=turned), ("" if z[k] > 0 else "−") + "xy"[k]
+    return robot.replace(tool=turned), ("" if z[k] > 0 else "−") + "xyz"[k]
 
 
 def _tilt_plane(robot: Robot, joints: int) -> TiltPlane | None:

@@ -53,11 +53,19 @@ def written(tmp_path):
 
 @pytest.mark.parametrize(("away", "named"), [("0 0 0", False), ("0 0 0.1", True)])
 def test_frames_at_the_flange_are_no_choice(written, away, named):
-    """As ``tool0`` and ``tcp``, which makers' files put at one place."""
-    ends = [joint(name, "fixed", "l5", name, xyz=xyz, more="") for name, xyz in (("tool0", "0 0 0"), ("tcp", away))]
+    """As ``ee`` and ``tcp``, which makers' files put at one place."""
+    ends = [joint(name, "fixed", "l5", name, xyz=xyz, more="") for name, xyz in (("ee", "0 0 0"), ("tcp", away))]
     found = import_urdf(written(row(6), *ends))
     assert any("fixed frames" in note for note in found.notes) == named
     assert found.tip == "l5"
+
+
+@pytest.mark.parametrize("names", [("camera", "flange"), ("flange", "camera", "tool0"), ("r1_tool0", "r1_flange")])
+def test_of_several_frames_tool0_is_the_flange_or_else_the_one_called_so(written, names):
+    ends = [joint(name, "fixed", "l5", name, xyz=f"0 0 {k}", more="") for k, name in enumerate(names, 1)]
+    found = import_urdf(written(row(6), *ends))
+    assert found.tip == next((name for name in names if "tool0" in name), names[-1])
+    assert not any("fixed frames" in note for note in found.notes)
 
 
 def peer_poses(path, names, q, frame):

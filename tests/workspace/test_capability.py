@@ -119,7 +119,9 @@ def test_a_free_roll_reaches_what_some_roll_reaches(random):
     assert 0 < told.reachability.min() < 1
 
 
-@pytest.mark.parametrize(("turn", "name"), [(("y", -90), "x"), (("x", 90), "y"), (("x", -90), "−y"), (("z", 40), "z")])
+@pytest.mark.parametrize(
+    ("turn", "name"), [(("y", -90), "x"), (("x", 90), "y"), (("x", -90), "−y"), (("z", 40), "z"), (("x", 180), "−z")]
+)
 def test_a_tool_points_along_the_last_axis_whatever_the_flanges_axes_are_called(turn, name, random):
     robot = load_robot("irb120")
     flange = robot.flange.copy()

@@ -79,9 +79,9 @@ def _answer(
     params = summary.verdict.finding.params
     shapes = summary.verdict.shapes
     lines = [0.0, *([shapes.margin_mm] if shapes else [])]
+    ranges = [dict.fromkeys([fixed(each.least_mm, 1), fixed(each.most_mm, 1)]) for each in summary.steady]
     steady = [
-        ListRow("none", say(each.between), with_unit(f"{fixed(each.least_mm, 1)}–{fixed(each.most_mm, 1)}", "mm"))
-        for each in summary.steady
+        ListRow("none", say(each.between), with_unit("–".join(own), "mm")) for each, own in zip(summary.steady, ranges)
     ]
     ends = [0.0, *(each.clearance_mm for each in closest)]
     span = min(ends), max(ends)
