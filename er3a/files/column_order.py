@@ -165,8 +165,8 @@ def only_order(rows: Grid) -> Words:
         angles = turned[alpha] and turned[theta] and any(right[alpha]) and not any(named[alpha])
         links = zip(none[a], columns[alpha], named[d])
         one_line = [bool(blank and _PARALLEL.fullmatch(twist) and not slides) for blank, twist, slides in links]
-        apart = not any(one_line[:-1]) or not any(one_line[1:])
-        if lengths and angles and sum(named[d]) <= sum(named[theta]) and apart:
+        separate = not any(one_line[:-1]) or not any(one_line[1:])
+        if lengths and angles and sum(named[d]) <= sum(named[theta]) and separate:
             found.append((a, alpha, d, theta))
     order = dict(zip(found[0], _ROLES)) if len(found) == 1 else {}
     return [order[k] for k in sorted(order)]

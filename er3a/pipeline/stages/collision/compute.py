@@ -162,15 +162,13 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     space = free_space.sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])
     places = free_space.find_places(bodies, space, settings.cells_across, settings.rounds, random)
-    file = study.entry(name).targets
-    targets, at_targets, blocked = target_clearances(robot, bodies, file)
+    targets, at_targets, blocked = target_clearances(robot, bodies, study.entry(name).targets)
     home_from, q_home = _home(bodies, study.home(name), space.q[space.free])
     at_home, depth = _overlap(bodies, q_home)
     if at_home is None:
-        solved = meant(robot, np.reshape([each.q_deg for each in at_targets], (-1, robot.joints)))
-        places.joined[:] = free_space.joined_to_home(
-            bodies, places, q_home, solved[bodies.free(solved)], settings.neighbours
-        )
+        solved = _poses(robot, at_targets)
+        solved = solved[bodies.free(solved)]
+        places.joined[:] = free_space.joined_to_home(bodies, places, q_home, solved, settings.neighbours)
     motions = list(listed_motions(study.entry(name).paths, task_of(study, name), CHECKS))
     tolerance = settings.penetration_tolerance_mm / 1000
     paths, on_paths, first_touch = path_clearances(motions, bodies, tolerance)
@@ -179,12 +177,9 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     wrong = bodies.in_error and fact(
         "collision.shapes_overlap", pairs=bodies.in_error, count=TRIED, free_ratio=space.whole.value
     )
-    shown_closest = closest = (*at_targets, *on_paths)
+    closest = nearest = (*at_targets, *on_paths)
     if steady := _steady(bodies, closest):
-        others = Bodies(robot, scene, [each.between for each in steady])
-        targets, again, _ = target_clearances(robot, bodies, file, others)
-        paths, on_the_way, _ = path_clearances(motions, others, tolerance)
-        shown_closest = (*again, *on_the_way)
+        targets, paths, nearest = _but_steady(bodies, steady, study.entry(name).targets, motions, tolerance)
     assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
     free = _free_space(space, places_found, at_targets, blocked, _colliding(motions, on_paths, first_touch)).but(
         shapes_assumed=assumed is not None
@@ -194,7 +189,6 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     if at_home is not None:
         free = free.but(joined=None)
         home = fact("collision.home_collides", pair=at_home, depth_mm=1000 * depth, **free.params)
-    rows = model.PlaceRows.of(places, middle=places.middles, witness_deg=shown(robot, places.witness))
     return model.CollisionResults(
         summary=model.CollisionSummary(
             verdict=_verdict(pairs, mounting, wrong or None, free, home).with_assumed_shapes(assumed),
@@ -210,22 +204,32 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             penetration_tolerance_mm=settings.penetration_tolerance_mm,
             places=places_found,
             mounting=mounting,
-            closest=shown_closest,
-            steady=tuple(steady),
+            closest=nearest,
+            steady=steady,
             checked=_checked(study, name, covered, motions),
             assumed=(*_chosen(motions), *assumed_tool(robot), *covered.assumed),
         ),
         matrix=matrix,
         pairs=pairs,
-        places=rows.of_joints(robot.slides),
+        places=_place_rows(robot, places),
         targets=targets,
         paths=paths,
     )
 
 
+def _place_rows(robot: Robot, places: free_space.ClearPlaces) -> model.PlaceRows:
+    rows = model.PlaceRows.of(places, middle=places.middles, witness_deg=shown(robot, places.witness))
+    return rows.of_joints(robot.slides)
+
+
+def _poses(robot: Robot, closest: Sequence[model.Closest]) -> Reals:
+    """The joint values (k, n), rad or m, at which something is nearest."""
+    return meant(robot, np.reshape([each.q_deg for each in closest], (-1, robot.joints)))
+
+
 def _steady(bodies: Bodies, closest: Sequence[model.Closest]) -> tuple[model.SteadyPair, ...]:
     """The pairs with few joints between them that are as near in all rows, and nearer than the rest in some row."""
-    poses = meant(bodies.robot, np.reshape([each.q_deg for each in closest], (-1, bodies.robot.joints)))
+    poses = _poses(bodies.robot, closest)
     links = np.array([body.link for body in bodies.all])  # -1 of solids
     pairs = np.arange(len(bodies.pairs))
     far = 1000 * np.array([bodies.counted(bodies.distances(q, pairs)) for q in poses]).reshape(-1, len(pairs))
@@ -241,6 +245,16 @@ def _steady(bodies: Bodies, closest: Sequence[model.Closest]) -> tuple[model.Ste
     nearer = np.flatnonzero(steady & (low < far[:, ~steady].min(axis=1).max()))
     order = nearer[np.argsort(low[nearer], kind="stable")]
     return tuple(model.SteadyPair(bodies.pairs[pairs[k]], float(low[k]), float(low[k] + spread[k])) for k in order)
+
+
+def _but_steady(
+    bodies: Bodies, steady: Sequence[model.SteadyPair], file: str, motions: Sequence[ListedMotion], tolerance: float
+) -> tuple[model.TargetClearances, model.PathClearances, tuple[model.Closest, ...]]:
+    """Clearances of targets and paths without some pairs."""
+    others = Bodies(bodies.robot, bodies.scene, [each.between for each in steady])
+    targets, at_targets, _ = target_clearances(bodies.robot, bodies, file, others)
+    paths, on_paths, _ = path_clearances(motions, others, tolerance)
+    return targets, paths, (*at_targets, *on_paths)
 
 
 def _free_space(
