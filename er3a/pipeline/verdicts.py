@@ -44,7 +44,7 @@ class StageVerdict:
     Attributes
     ----------
     status : ``not_examined`` where the stage has not been computed yet
-    code : of the finding; text : in English; answer : its first sentence
+    code : of the finding; text : in English; answer : its first sentence, and the next where coverage makes a caution
     demonstrations : how many targets, paths, programs or objects in it fail as they are meant to
     expected : what the study says that the status is to be, if it does
     checked : what each check covers; not_checked : why not all, in English; assumed : what they rest on, in English
@@ -156,7 +156,8 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str, said: dic
     if verdict.status == "caution" != expected:
         said |= {gap: Open("as_above", (name,)) for gap in gaps} | said
     text = say_all(replace(verdict, missed=missed).findings)
-    answer = f"{text.partition('. ')[0].removesuffix('.')}."
+    sentences = 2 if verdict.lowered and not again else 1  # the second is why
+    answer = f"{'. '.join(text.split('. ')[:sentences]).removesuffix('.')}."
     outdated = changed_since(folder, study, robot, name)
     if outdated:
         text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)

@@ -164,7 +164,9 @@ def payload_key(summary: Summary | None, robot: Robot) -> tuple[str, str]:
     value, meaning : in the page's language
     """
     if least := _least(summary):
-        return with_unit(f"≤ {least[0]}", "kg"), tr("payload at the flange, by {limits}", limits=joined(least[1], ", "))
+        return with_unit(f"≤ {least[0]}", "kg"), tr(
+            "upper bound of payload, by {limits}", limits=joined(least[1], ", ")
+        )
     wrist = robot.masses.wrist
     if wrist is not None and np.isfinite(wrist.payload):
         return with_unit(f"{wrist.payload:.3g}", "kg"), tr("rated at the flange, not examined")

@@ -151,8 +151,11 @@ names_in_words("own_values", "group", GROUP_NAMES)
 def open_names(found: Open, most: int | None = None) -> str:
     """Of which, in the language in use; beyond ``most`` how many more."""
     code, words = _words.get(found.reason, ("", {}))
+    count = len(found.names)
+    if count > 2 and list(found.names) == [f"J{k}" for k in range(1, count + 1)]:
+        return f"J1–J{count}"
     named = [own_title(word(code, words, name)) for name in found.names[:most]]
-    rest = len(found.names) - len(named)
+    rest = count - len(named)
     return joined([*named, *([sentence("more", count=rest)] if rest else [])], ", ")
 
 
