@@ -120,7 +120,7 @@ def _segments(code: Code, rows: list[_Link]) -> None:
     craig = "DH_Craig" in code.text
     chains = dict[str, tuple[Words, list[_Link]]]()
     for each in code.groups:
-        if re.search(r"\bSegment\s*$", each.before):
+        if re.search(r"\bSegment\s*$", each.before) and each.inside.strip():  # an empty one moves and turns nothing
             said = " ".join(joints.get(part, part) for part in parts(each.inside))
             own = [row for row in rows if each.start < row.place < each.end]
             found = [kind for kind in _KINDS if re.search(rf"\b{kind}\b", said)]

@@ -77,7 +77,8 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
         text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b|π|2rad|radians", "π", " ".join(cells), flags=re.I)
         if quantity == "theta" and mark == "=" and not re.search(r"[^\W\dπ]", text):
             quantity = "pose" if name != "q" and re.search("[1-9π]", text) else ""
-            quantity = "offset" if re.search(_SUMMED.replace("NAME", name), program) else quantity
+            summed = re.search(_SUMMED.replace("NAME", name), program) or "dh" in name.lower()
+            quantity = "offset" if summed else quantity
         quantity = "alpha" if quantity == "a" and "π" in text else quantity
         if quantity == "a" and name[0] in "rR" and columns.get("a", "r")[-1][0] not in "rR":
             quantity = "d"  # Khalil's r, with a
@@ -211,6 +212,9 @@ MOST_ROWS = 10  # joints that er3a models
 MOST_PASSES = 99  # more than any arm has links
 
 
+_COLUMN = re.compile(r"(\w+)\s*=\s*(\w+)([\[(])\s*:\s*,\s*(\d+)\s*[\])]")  # a = DH(:, 3)
+
+
 _INDEX = re.compile(r"@\d+|[\[({][^\[\](){}]*[\])}]|\.\w+")
 
 
@@ -270,6 +274,11 @@ class Lists:
             elif len(rows := rows_of(code, group)) > 1 and name not in self.values:
                 inner = [record_of(each) for each in code.groups if group.start < each.start < group.end]
                 self.values[name] = [each for each in inner if is_row(each)] or [row for _, row in rows]
+
+        for name, matrix, bracket, column in _COLUMN.findall(code.text):
+            cells, k = self.values.get(matrix), int(column) - (self.first if bracket == "[" else 1)
+            if isinstance(cells, list) and all(isinstance(row, list) and 0 <= k < len(row) for row in cells):
+                self.values[name] = [row[k] for row in cells]
 
     def written_out(self, call: CodeGroup) -> Words:
         """The arguments of a call as often as it is carried out, with the elements of lists in place of their names."""

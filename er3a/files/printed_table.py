@@ -70,23 +70,30 @@ _KIND_ELSEWHERE = re.compile(
 _LISTS = re.compile(
     r"\b((?:(?!link_?offset)\w*offsets?(?:_[a-z]\w*)?)|th(?:eta)?_?0|"
     r"\w*(?:types?|sigma|signs?|directions?|dirs?|polarity|inv_joints?))\s*(?:\[\d*\])?\s*[:=]"
-    r"\s*([\w.(]*)[\[{]([^\[\]{}]*[1-9a-z][^\[\]{}]*)[\]}]",
+    r"\s*([\w.(]*)[\[{]([^\[\]{}]*[1-9a-z][^\[\]{}]*)[\]}](?:[ \t]*(\*[^;\n]+))?",
     re.I,
 )
 """A list of offsets, of types, or of directions, and a call that its elements are in."""
+_WORD = re.compile(r"[^,;\s\"']+")
 _CONVERTED = "deg2rad(", "np.deg2rad(", "radians(", "np.radians("
+_JOINTS_SAID = re.compile(r"(?i)\b(?:n(?:um(?:ber)?)?_?(?:of_)?)?(?:dofs?|joints)\s*=\s*(\d+)\b")
 _TYPES = {*words_of("r p revolute prismatic fixed")}
 _JOINTS = re.compile(r"Joint\([^;\n]*[\"'](revolute|prismatic|fixed)[\"']")
+_TURN, _ARGUMENT = r"(?<![a-z])(?:\w+\.)?(?:t?rot_?|r_?)", r"\b(?:\([^()\n]*\))?"
+_THEN = rf"{_ARGUMENT}\s*[@*]\s*(?:(?:\w+\.)?t(?!rot)\w*{_ARGUMENT}\s*[@*]\s*){{1,2}}"
+"""A turn in a product of a row's transforms, and what is between two of them."""
 SIGNS = {
     "modified": re.compile(
+        rf"{_TURN}x{_THEN}{_TURN}z\b|"
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
-        r"(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|修改\s*d-?h|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
+        r"(?<![a-z])(?:revolute|serialmanipulator)?(?:mdh|moddh)(?![a-z])|改进|修改\s*d-?h|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
         r"(?:(?:sin|cos)\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\b[sc]a)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
         r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:(?:sin|cos)\([^\n,;*]{0,30}(?:al|α)|[sc]a\b)|"
         r"cos\((?P<twist>[^\n;]{1,40}?)\)[\s,;]+-(?:\w+\.)*sin\((?P=twist)\)[\s,;]+-[^,;\n]{0,40}sin\((?P=twist)\)",
         re.I,
     ),
     "standard": re.compile(
+        rf"{_TURN}z{_THEN}{_TURN}x\b|"
         r"(?:standard|classic\w*)[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*standard|stddh|(?<![a-z])sdh(?![a-z])|标准|"
         r"[\"'](?:standard|classic|normal)[\"']|"
         r"\b[ar](?:_?i)?(?:\s*\*\s*(?:\w+\.)*(?:cos\([^\n,;*]{0,30}(?:th|θ|q)|ct\b)|\s*·?\s*\\?cos[\s(\\]{1,2}(?:th|θ|q))|"
@@ -201,7 +208,7 @@ def printed_table(
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
     tables = [*{str([row for _, row in table]): table for table in found[:9]}.values()]
-    ranks = [(_has_twists(table), "theta" in map(place_of, table[0][1])) for table in tables]
+    ranks = [(*_has_twists(table), "theta" in map(place_of, table[0][1])) for table in tables]
     tables = [table for table, rank in zip(tables, ranks) if rank == max(ranks)]  # no colours, poses, symbols alone
     if not tables:
         return None
@@ -218,17 +225,20 @@ def _differ(one: Grid, other: Grid) -> bool:
     return bool(first - second and second - first)
 
 
-def _has_twists(table: Grid) -> bool:
-    """Whether each twist of a table is 0, a multiple of 45 degrees, or an angle with its unit or of 10 degrees on."""
+def _has_twists(table: Grid) -> tuple[bool, bool]:
+    """Whether each twist of a table is 0, a multiple of 45 degrees, or an angle with its unit or of 10 degrees on, and
+    any is not 0."""
     (_, header), *rows = table
+    any_twist = False
     for cell in (cell for _, row in rows for name, cell in zip(header, row) if quantities_of([name]) == ["alpha"]):
         with suppress(ValueError):
             found = amount_of(re.sub(r"(?<=[\d.])f\b|\b[a-z]\w*(?:::|\.)", "", cell))
             size, off = abs(found.number), abs(math.remainder(found.number, math.pi / 4))
             if not found.variables and (found.unit or not size or size > SMALLEST_DEG or off < RIGHT_WITHIN < size):
+                any_twist |= size > 0
                 continue
-        return False
-    return True
+        return False, False
+    return True, any_twist
 
 
 def _lengths(table: Grid) -> set[str]:
@@ -413,12 +423,12 @@ def _with_lists(path: Path, text: str, grid: Grid) -> Grid:
     list of directions is asked back, as an offset may be added before or after."""
     (line, header), *rows = grid
     lists = [
-        (name, [f"{call}{cell})" if call in _CONVERTED else cell for cell in re.findall(r"[^,;\s\"']+", cells)])
-        for name, call, cells in _LISTS.findall(text)
+        (name, [f"{call}{cell}){factor}" if call in _CONVERTED else cell + factor for cell in _WORD.findall(cells)])
+        for name, call, cells, factor in _LISTS.findall(text)
     ]
     found = [each for each in lists if len(each[1]) > 1]  # not an element: offset = table[i]
     own = "".join(cell for _, row in rows for each, cell in zip(header, row) if quantities_of([each]) == ["offset"])
-    of_links = re.search(r"(?s)SerialLink\(.*\boffset\s*=\s*(?:\[[^\]]*\]|\w+)[;\s]", text)
+    of_links = re.search(r"(?s)SerialLink\(.*\boffset\s*=\s*(?:\[[^\]]*\]|\w+)\s*[*;\s]", text)
     for name, cells in [("type", _JOINTS.findall(text)), *found]:
         quantities, said = quantities_of(header), {each.lower() for each in cells}
         of_types, of_signs = (re.search(words, name, re.I) for words in ("type|sigma", "sign|dir|polar|inv"))
@@ -476,6 +486,7 @@ class _Table:
         labels = [k for k, own in found.items() if own.quantity == "joint"]
         self.headings = {k: own for k, own in found.items() if k not in labels[1:]}
         self.column = dict[str, int]()
+        self.from_code = from_code
         self.of_toolbox = from_code and bool(re.search(r"\bSerialLink\(|\bLink\(\[", self.text))
         self.given = self._given(Lists(program(text)) if from_code else None)
         self._check_headings()
@@ -489,6 +500,11 @@ class _Table:
         self._offset_slides()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             raise InputError(path, "types of joints", f"'{kind[0]}' is no column of the table", "Add a column of types")
+        moving = len(self.kinds) - sum(map(self.kinds.count, FIXED))
+        said = [int(each) for each in _JOINTS_SAID.findall(text)] if from_code else []
+        if said and max(said) < moving:
+            problem = f"the table has {moving} rows that move, and the text says {max(said)} joints"
+            raise InputError(path, "joints", problem, "Leave out rows of flange and tool, or name them so")
         self.columns: dict[str, Words] = {"joint": self._joints()}
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
@@ -669,7 +685,9 @@ class _Table:
         variable although others have one, or at an end if it alone has no number in its name."""
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
         if k is not None:
-            types = [cells[k].strip().lower() for _, cells in self.rows]
+            types = [re.sub(r"^[a-z]\w*\.", "", cells[k].strip().lower()) for _, cells in self.rows]
+            if self.from_code and "prismatic" in types:  # a class has a default
+                types = [each or "revolute" for each in types]
             given = {number or other: kind or word for kind, number, other, word in _KIND_SAID.findall(text.lower())}
             if not {*types} <= {*given} or "revolute" not in map(given.get, types):  # or how many there are of a kind
                 given = _KINDS

@@ -128,7 +128,8 @@ def latex_grids(text: str) -> list[Grid]:
 
 def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
     """A text's lines cut into cells, by each separator in turn; lines without it have one cell."""
-    text = re.sub(r"(?m)^[ \t]*[#%/*]+!?[ \t]*(?=\|)", "", plain(text))  # a table in comments
+    text = re.sub(r":math:`([^`\n]*)`", r"$\1$", plain(text))
+    text = re.sub(r"(?m)^[ \t]*[#%/*]+!?[ \t]*(?=\|)", "", text)  # a table in comments
     broken = re.sub(r"[ \t]*\n\s*(-?π)\s*\n\s*(\d)[ \t]*(?=\n)", r" \1/\2\n\n", text)  # a fraction over three lines
     lines = [
         (number, line)

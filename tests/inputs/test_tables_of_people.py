@@ -288,6 +288,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i,α,d,θ,r\n1,90,270,θ1,300\n2,0,200,θ2,0\n", "--column"),  # Khalil's d is a
         ("i,a,alpha,d,theta\n1,a1,90,300,q1\n2,270,0,0,q2\n", "a1 = "),
         ("rows = [[q1, 290, 0, -pi/2], [q2, 270, 0, pi/2], [q3, 0, 70, 0]]", "no names"),
+        ("num_dof = 1\n# a alpha d theta\nM = [[0, -pi/2, 290, 0], [270, 0, 0, 0]]", "says 1 joints"),
         ("a1 = 0; a2 = 10\na2 = in_metres(a2)\n# a alpha d theta\nM = [[a1, pi/2, 1, 0], [a2, 0, 0, 0]]", "two values"),
         ("# d, a, alpha\nrows = [[0.3, 0, -pi/2],\n        [0, 0.3, 0]]\noffsets_left = [0, pi/2]", "offsets_left"),
         (
@@ -452,7 +453,9 @@ def test_comments_in_another_encoding_are_left_out_and_cells_asked_back(tmp_path
     assert er3a.read_table(tmp_path / "arm.m").alpha[0] == pytest.approx(-np.pi / 2)
 
 
-@pytest.mark.parametrize("offset", ["R.offset = [0 -pi/2];", "offset = deg2rad([0 -90]);\nR.offset = offset;"])
+@pytest.mark.parametrize(
+    "offset", ["R.offset = [0 -pi/2];", "R.offset = [0 -90]*pi/180;", "offset = deg2rad([0 -90]);\nR.offset = offset;"]
+)
 def test_the_offsets_of_a_toolbox_arm_are_added_to_its_matrix_and_its_theta_is_none(tmp_path, offset):
     text = f"DH = [0 0.29 0 -pi/2 0;\n pi 0 0.27 0 0];\nR = SerialLink(DH);\n{offset}\n"
     content, notes = read(tmp_path, text)
@@ -597,6 +600,8 @@ $L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
         (ROWS_OF_TWO + "a = M(i,1); alpha = M(i,2); d = M(i,3); theta = M(i,4);", "standard"),
         ("% each row is [a alpha d theta]\n" + 9 * "x = 1;\n" + ROWS_OF_TWO, "standard"),
         (f"% Modified DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [cos(theta), a*cos(theta)];", "standard"),
+        (f"% [a alpha d theta]\n{ROWS_OF_TWO}T = rotX @ transX @ transZ @ rotZ", "modified"),
+        (f"% [a alpha d theta]\n{ROWS_OF_TWO}T = SE3.Rz(q)*SE3.Tz(d)*SE3.Tx(a)*SE3.Rx(al)", "standard"),
         (f"% standard DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [-sin(alpha), -sin(alpha)*d];", "modified"),
         (  # Craig's transform, of columns by their numbers
             f"% [a alpha d theta]\n{ROWS_OF_TWO}T = [sin(M(i,4))*cos(M(i,2)), cos(M(i,4))*cos(M(i,2)), -sin(M(i,2)),"
@@ -975,10 +980,6 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
             " 'alpha', al(j));\nend",
             "loop",
         ),
-        (
-            "DH=[0 0.29 0 -1.57 0;\n 0 0 0.27 0 0];\nR=SerialLink(DH);\nR.offset=[0 -90]*pi/180;\n",
-            "line 4: 'offset' may be",
-        ),
         ("% theta d a alpha\nDH=[0 0.29 0 -90;\n 0 0 0.27 0] .* [1 1 1 pi/180];\n", "row 2|line"),
         (f"# theta d a alpha\n{MATRIX}DH[1][2] = -0.5\n", "DH"),
         (f"# theta d a alpha\n{MATRIX}DH = np.vstack([DH, [0, 0, 0.1, 0]])\n", "changes 'DH'"),
@@ -1109,6 +1110,16 @@ def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
         "| i | α (rad) | a (mm) | d (mm) | θ (deg) |\n|--|--|--|--|--|\n| 1 | -π/2 | 0 | 290 | 0 |\n"
         "| 2 | 0 | 270 | 0 | β - 120 |\n\nβ = 30°\n",
         "# Units: lengths in cm\n# a alpha d theta\nM = [[0, -pi/2, 29, 0], [27, 0, 0, -pi/2]]\ntypes = ['R', 'R']\n",
+        "DH: np.ndarray = np.array([\n  # a, alpha, d, theta\n  [0, -np.pi/2, 290, 0],\n  [270, 0, 0, -np.pi/2]])\n",
+        "DH_A = [0, 270]\nDH_ALPHA = [-pi/2, 0]\nDH_D = [290, 0]\nDH_THETA = [0, -pi/2]\n",
+        "M = [290 0 -pi/2; 0 270 0];\nd = M(:,1); a = M(:,2); alpha = M(:,3);\n"
+        "L(1) = Link([0 d(1) a(1) alpha(1) 0 0]);\n"
+        "L(2) = Link([0 d(2) a(2) alpha(2) 0 -pi/2]);\n",
+        "+---+-------------+----------------------+------------+-------------------------+\n"
+        "| j | :math:`a_i` | :math:`\\alpha_i`     | :math:`d`  | :math:`\\theta`         |\n"
+        "+===+=============+======================+============+=========================+\n"
+        "| 1 | 0           | :math:`-90^\\circ`    | 290        | :math:`q_1`             |\n"
+        "| 2 | 270         | 0                    | 0          | :math:`q_2 - 90^\\circ` |\n",
         "float dh[2][4] = { // d, a, alpha, theta\n  {290.0, 0.0, -(float)M_PI/2, 0.0},\n"
         "  {0.0, 270.0, 0.0, (float)-M_PI/2}};\n",
     ],
