@@ -637,7 +637,7 @@ function showEntry(entry = entryOf(location.hash) || new URLSearchParams(locatio
   for (const part of document.querySelectorAll("[data-entry]")) part.classList.toggle("shown", part.dataset.entry === entry);
   evidence.textContent = document.getElementById(`cell-${entry}`)?.querySelector("a")?.dataset.said ?? "";
   for (const link of document.querySelectorAll(".grid .key > a")) link.hash = document.getElementById(`entry-${entry}`)?.id ?? "marks";
-  for (const link of entryLinks) link.toggleAttribute("data-shown", [entryOf(link.hash), link.dataset.asked].includes(entry));
+  for (const link of entryLinks) link.toggleAttribute("data-shown", [entryOf(link.hash), link.dataset.asked].includes(entry || document.querySelector(".player")?.dataset.opened));
 }
 for (const link of entryLinks) {
   link.addEventListener("pointerenter", () => showEntry(entryOf(link.hash)));
@@ -649,4 +649,4 @@ addEventListener("hashchange", () => dispatchEvent(new CustomEvent("entry", { de
 showEntry();
 // The one thing to do opens lines to copy.
 const asking = document.querySelector(".hero .fix a");
-for (const lines of document.querySelectorAll(".hero .lines")) asking?.addEventListener("click", () => (lines.open = true));
+for (const lines of document.querySelectorAll(".hero .lines")) asking?.addEventListener("click", () => setTimeout(() => lines.scrollIntoView({ block: "nearest" }), (lines.open = true) && 100));

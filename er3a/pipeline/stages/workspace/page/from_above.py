@@ -19,7 +19,6 @@ from er3a.robots.robot import Robot
 AROUND = 1.1  # of the reach, that is shown to each side
 DEAD = 0.2  # rad that axis 1 does not turn to: there is room for a word
 LETTER = 0.3  # half the width of a letter, of its height
-LONG = 4.0  # heights of words: a shorter way has no room for its length
 BASE, AXES = 0.06, 0.3  # of the reach: radius of the dot at axis 1, length of x and y
 
 
@@ -53,22 +52,16 @@ def from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, tra
     beyond = above + height / 3 if y > 0 else below - height  # away from the way that leads there
     words.append(_word(np.array([(left + right) / 2, beyond]), height, said, "tray", size))
     parts.append(Markup('<path class="way" d="M0,0H{:.0f}V{:.0f}"/>').format(x, -y))
-    ways = {"x": (x, (x / 2, height)), "y": (y, (x, y / 2))}
-    ways = {axis: way for axis, way in ways.items() if abs(way[0]) > LONG * height}
-    for axis, (value, middle) in ways.items():
-        words.append(_word(np.array(middle), height, with_unit(f"{axis} {fixed(value, 0)}", "mm"), "way", size))
+    far = reach * _way(3 * np.pi / 4 if y <= 0 else -3 * np.pi / 4)  # where the tray is not
+    parts.append(Markup('<path class="scale" d="M0,0L{:.0f},{:.0f}"/>').format(far[0], -far[1]))
+    words.append(_word(0.6 * far, height, with_unit(fixed(reach, 0), "mm"), "", size))
     gap = 2 * np.pi - (high - low)
     if gap > DEAD:
         parts.append(Markup('<path class="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
         words.append(_word(0.6 * reach * _way(high + gap / 2), height, tr("J1's dead zone"), "zone", size))
     parts.append(Markup('<path class="axes" d="M{0:.0f},0H0V-{0:.0f}"/>').format(AXES * reach))
-    named = [(axis, way) for axis, way in zip("xy", np.eye(2)) if axis not in ways]
-    words += [_word((AXES + BASE) * reach * way, height, axis, "", size) for axis, way in named]
+    words += [_word((AXES + BASE) * reach * way, height, axis, "", size) for axis, way in zip("xy", np.eye(2))]
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
-    scale = 2 * 10.0 ** np.floor(np.log10(reach / 2))
-    parts.append(Markup('<path class="scale" d="M{:.0f},{:.0f}h{:.0f}"/>').format(-reach, size - height / 2, scale))
-    at = np.array([2 * height - reach, height - size])
-    words.append(_word(at, height, with_unit(fixed(scale, 0), "mm"), "", size))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))
     drawing = '<svg class="plan-view" viewBox="{}" role="img" aria-label="{}">{}</svg>'
