@@ -19,7 +19,6 @@ from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import sound_motions
-from er3a.pipeline.stages.workspace.page.workspace_figures import about
 
 Glance = tuple[str, str]
 
@@ -59,10 +58,7 @@ def _(results: ValidationResults) -> Glance:
 def _(results: WorkspaceResults) -> Glance:
     summary = results.summary
     far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
-    sizes = [about(void) for void in summary.voids]
-    if len(sizes) > 1:
-        return far, tr("{count} voids", count=len(sizes))
-    return far, tr("void {size}", size=sizes[0]) if sizes else with_unit(fixed(summary.volume_m3.middle, 2), "m³")
+    return far, with_unit(fixed(summary.volume_m3.middle, 2), "m³")
 
 
 @glance.register

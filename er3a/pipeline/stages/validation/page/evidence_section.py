@@ -40,7 +40,6 @@ LEGEND = {
     "sound": N_("✓ {count} keep"),
     "open": N_("? {count} confirm"),
     "wrong": N_("✗ {count} wrong → instead (?: confirm)"),
-    "free": N_("{count} free"),
 }
 MARKS = {"sound": "✓", "open": "?", "wrong": "✗", "free": "–"}
 FIRST = 8  # entries to settle, named at the table's side

@@ -213,7 +213,7 @@ def _steps(
     before = [{"title": say(each.conflict.subject).capitalize(), "rows": each.rows} for each in asked]
     if not jogs:
         return [*before, {"title": tr("Confirm in this order"), "beside": tr("if wrong, tool off by"), "rows": first}]
-    title = tr("❶ Jog each joint (if wrong: {off})", off=first[0].note)
+    title = tr("❶ Jog each joint (if wrong, off by {off})", off=first[0].note)
     then = [replace(row, fix=Fix(row.name, row.address, instead=False)) for row in first[1:]]
     return [
         *before,
