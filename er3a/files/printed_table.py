@@ -209,7 +209,8 @@ def printed_table(
         raise InputError(path, error.field, error.problem, error.remedy) from None
     tables = [*{str([row for _, row in table]): table for table in found[:9]}.values()]
     ranks = [(*_has_twists(table), "theta" in map(place_of, table[0][1])) for table in tables]
-    tables = [table for table, rank in zip(tables, ranks) if rank == max(ranks)]  # no colours, poses, symbols alone
+    if from_code:  # which has colours, poses and symbols, too
+        tables = [table for table, rank in zip(tables, ranks) if rank == max(ranks)]
     if not tables:
         return None
     tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]

@@ -1193,6 +1193,11 @@ def test_lists_and_matrices_are_read_as_their_program_takes_them(tmp_path, text,
             "|2|θ2|149mm|-20mm|90|\n",
             "2 D-H tables, at lines 1 and 4",
         ),
+        (  # of a planar arm and another one
+            "|i|θ|d|a|α|\n|--|--|--|--|--|\n|1|θ1|0|300|0|\n|2|θ2|0|200|0|\n\n"
+            "|i|θ|d|a|α|\n|--|--|--|--|--|\n|1|θ1|290|0|-90|\n|2|θ2|0|270|0|\n",
+            "2 D-H tables",
+        ),
         (
             "M = [0 0 0.3 0;\n 0.2 0 0 0;\n 0.1 0 0 0];\nsetFixedTransform(j1, M(1,:), 'dh');\n"
             "setFixedTransform(j2, M(2,:), 'dh');\n",
