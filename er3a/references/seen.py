@@ -111,7 +111,10 @@ class SeenMotion(quantities.QuantityAtPose):
         T = state.at(self.pose)
         moves = {self.joint - 1: 1.0} if state.coupling is None else dict(enumerate(state.coupling[:, self.joint - 1]))
         motion = np.zeros_like(T[..., 0, :3, 2])
+        frame = quantities.FRAME_OF_POINT[self.point]
         for row, factor in moves.items():
+            if 0 <= frame < row and self.manner == "moves":
+                continue  # the joint comes after the point
             axis = factor * T[..., row, :3, 2] * state.direction[..., row, None]
             arm = T[..., quantities.FRAME_OF_POINT[self.point], :3, 3] - T[..., row, :3, 3]
             if state.sliding is not None and state.sliding[row]:

@@ -100,3 +100,13 @@ def test_what_is_seen_of_slides_and_coupled_joints_is_the_motion_itself():
         seen = SeenMotion(pose, joint, "flange", "up")
         angle = np.degrees(np.arccos(moved[2] / np.linalg.norm(moved)))
         assert read([seen], state_of(arm, [seen]))[0] == pytest.approx(angle, abs=1e-4)
+
+
+@pytest.mark.parametrize("joint", range(1, 7))
+def test_a_point_is_seen_to_move_as_it_does_by_joints_before_it_only(joint):
+    arm, q, step = load_robot("ur5e"), np.radians([10, -70, 80, 30, 50, 60]), 1e-6 * (np.arange(6) == joint - 1)
+    moved = frames(arm, q + step)[4, :3, 3] - frames(arm, q - step)[4, :3, 3]
+    length = np.linalg.norm(moved)
+    expected = np.degrees(np.arccos(moved[0] / length)) if length > 1e-9 else 90.0
+    seen = SeenMotion(tuple(np.degrees(q).tolist()), joint, "wrist_centre", "forward")
+    assert read([seen], state_of(arm, [seen]))[0] == pytest.approx(expected, abs=1e-3)
