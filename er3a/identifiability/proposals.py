@@ -18,7 +18,7 @@ from er3a.finding import Finding, fact
 from er3a.identifiability.entries import entries_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence
 from er3a.identifiability.statements import ToolRange
-from er3a.kinematics.table_batch import join, tables_of
+from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
 from er3a.references.quantities import FRAME_OF_POINT, Point, Pose
@@ -104,16 +104,32 @@ def _fine_enough(evidence: Evidence, entry: Entry, tool: ToolRange) -> float:
 
 def _look(evidence: Evidence, entry: Entry) -> Finding | None:
     """What to look at to determine a joint's direction, independent of other open entries."""
-    robot = evidence.robot
-    others = [each for each in evidence.allowed if entry.name not in each.names]
-    own = [each for each in evidence.readings if entry.name in each.names]
-    tables = join([tables_of(robot), *(each.table for each in (*others, *own))])
-    unaffected = len(others) + 1
+    others = [each.table for each in evidence.allowed if entry.name not in each.names]
+    own = [each.table for each in evidence.readings if entry.name in each.names]
+    return look_at(evidence.robot, entry.joint, others, own)
+
+
+def look_at(
+    robot: Robot, joint: int, others: Sequence[Tables] = (), reversed_: Sequence[Tables] = ()
+) -> Finding | None:
+    """What to look at to determine a joint's direction.
+
+    Parameters
+    ----------
+    joint : from 1 on
+    others : tables that may be right as well, with the same direction
+    reversed_ : those with the other one, as which the motion must be seen in the other sense
+
+    Returns
+    -------
+    look : ``look_at_motion``; None where no pose shows it
+    """
+    tables, unaffected = join([tables_of(robot), *others, *reversed_]), len(others) + 1
     for pose in _poses(robot):
         for point, manner in OBSERVATIONS:
             if FRAME_OF_POINT[point] > robot.rows:
                 continue
-            motions = [SeenMotion(pose, entry.joint, point, seen) for seen in SEEN]
+            motions = [SeenMotion(pose, joint, point, seen) for seen in SEEN]
             motions = [motion for motion in motions if motion.manner == manner]
             values = predict_tables(tables, robot, motions)
             best = int(np.argmin(values[0]))
@@ -122,8 +138,8 @@ def _look(evidence: Evidence, entry: Entry) -> Finding | None:
             if plain and turned:
                 return fact(
                     "look_at_motion",
-                    entry=entry.name,
-                    joint=entry.joint,
+                    entry=f"direction{joint}",
+                    joint=joint,
                     point=point,
                     pose_deg=pose,
                     seen=motions[best].seen,

@@ -13,6 +13,7 @@ from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.finding import is_one
 from er3a.identifiability.entries import column_of
+from er3a.identifiability.proposals import look_at
 from er3a.kinematics.forward import frames
 from er3a.pipeline.language import N_, own_title, tr, unit_sign, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
@@ -34,6 +35,7 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     other_robot,
     plain_table,
     poses_to_read,
+    to_confirm,
     to_settle,
 )
 from er3a.pipeline.study import Study
@@ -103,7 +105,9 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     other = study.robot(instead) if instead else other_robot(robot, summary.evidence)
     asked = [_Asked(robot, each) for each in disputed[:1]]
     evidence = evidence_section(summary.evidence, [name for each in asked for name in each.lengths])
-    pictured = _pictured(robot, other, evidence or {}, asked)
+    to_jog = [look for joint in range(1, robot.joints + 1) if (look := look_at(robot, joint))] if not evidence else []
+    known = evidence or {"looks": to_jog, "first": to_confirm(None)}
+    pictured = _pictured(robot, other, known, asked)
     render_stage(
         study,
         stored,
@@ -112,7 +116,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         **pictured,
         steps=_steps(
             summary.evidence.contradicted if summary.evidence else 0,
-            (evidence or {}).get("first", ()),
+            known["first"],
             pictured["jogs"],
             pictured["asked"],
         ),
@@ -213,7 +217,8 @@ def _steps(
     before = [{"title": say(each.conflict.subject).capitalize(), "rows": each.rows} for each in asked]
     if not jogs:
         return [*before, {"title": tr("Confirm in this order"), "beside": tr("if wrong, tool off by"), "rows": first}]
-    title = tr("❶ Jog each joint (if wrong, off by {off})", off=first[0].note)
+    off = first[0].note
+    title = tr("❶ Jog each joint (if wrong, off by {off})", off=off) if off else tr("❶ Jog each joint")
     then = [replace(row, fix=Fix(row.name, row.address, instead=False)) for row in first[1:]]
     return [
         *before,
