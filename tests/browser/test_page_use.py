@@ -249,7 +249,8 @@ def test_a_place_inside_of_a_program_shows_that_program_whole_with_its_player(br
     assert browser.find_element(By.CSS_SELECTOR, ".player canvas").is_displayed()
     assert browser.find_element(By.ID, "singular_line").is_displayed()
     assert not browser.find_element(By.ID, "out_of_reach").is_displayed()
-    assert browser.find_element(By.CSS_SELECTOR, ".player select.motion").get_property("value") == "singular_line"
+    motion = browser.find_element(By.CSS_SELECTOR, ".player select.motion")
+    WebDriverWait(browser, PAUSE).until(lambda _: motion.get_property("value") == "singular_line")
 
 
 def test_a_row_that_an_address_leads_to_has_the_heads_of_its_columns(browser, small_study):
