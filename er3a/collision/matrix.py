@@ -91,7 +91,7 @@ class CollisionMatrix:
     """The allowed collision matrix: a row for each pair of links, and the pairs of bodies that are checked.
 
     ``joined`` says of each of these whether only overlap means anything: of what is left of two bodies that a joint
-    joins, and of housings that never part by ``ASSUMED_MARGIN``.
+    joins, and of assumed shapes that never part by ``ASSUMED_MARGIN``.
     """
 
     rows: tuple[MatrixRow, ...]
@@ -145,7 +145,8 @@ def matrix_of(robot: Robot, pairs: Sequence[BodyPair], rules: Sequence[PairRule]
             row, kept = MatrixRow(*names, "allowed", witness, reason=rule.reason, hides=bool(kept)), []
         rows.append(row)
         watched += kept
-        joined += [row.state == "joined" or (not rule and _held(robot, kept, ASSUMED_MARGIN))] * len(kept)
+        guessed = arm_shapes(robot).assumed and not rule and _held(robot, kept, ASSUMED_MARGIN)
+        joined += [row.state == "joined" or guessed] * len(kept)
     return CollisionMatrix(tuple(rows), tuple(watched), tuple(joined))
 
 
@@ -350,7 +351,7 @@ class BaseContact:
 
 
 def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
-    """Solids that the base overlaps or rests on, the deepest contact with each.
+    """Solids that the base overlaps or rests on, the deepest contact with each; a guessed base only if it is inside.
 
     Parameters
     ----------
@@ -368,14 +369,16 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
         return ()
     both = [(first + more, second) for more in (0, len(base)) for first, second in pairs]
     distances, deep, _ = _measured(robot, bodies, both, np.zeros(robot.joints))
-    found: dict[str, BaseContact] = {}
+    given, found = arm_shapes(robot).given, dict[str, BaseContact]()
     for k, (a, b) in enumerate(pairs):
         distance, touches, middle = distances[k], deep[k], distances[len(pairs) + k]
         inside = bool(deep[len(pairs) + k]) or middle + bodies[a].radius < -INSIDE
         contact = BaseContact(bodies[b].name, 0.0 - float(distance), inside)
         before = found.get(contact.solid)
-        if (touches or distance < 0) and (
-            before is None or (contact.inside, contact.depth) > (before.inside, before.depth)
+        if (
+            (given or inside)
+            and (touches or distance < 0)
+            and (before is None or (contact.inside, contact.depth) > (before.inside, before.depth))
         ):
             found[contact.solid] = contact
     return tuple(found.values())

@@ -213,6 +213,28 @@ def _end(robot: Robot) -> Reals:
     return point
 
 
+def outward(robot: Robot) -> tuple[float, float]:
+    """Which way the last joint's axis leads out of an arm, and how far the last link goes on there.
+
+    Parameters
+    ----------
+    robot : its tool is not looked at
+
+    Returns
+    -------
+    sense : 1 along the axis, or -1; 0 where the flange is on no side of that joint, and no file gives a shape there
+    beyond : m, from the flange to the end of the last link's shape that way; below 0 where it ends before
+    """
+    at = float(constant_links(robot.replace(tool=np.eye(4)))[-1][2, 3])
+    parts = [np.array([each.start, each.end])[:, 2] for each in robot.envelopes if each.link == robot.rows]
+    parts += [np.array(each.points)[:, 2] for each in robot.hulls if each.link == robot.rows]
+    parts += [each.points[:, 2] for each in robot.meshes if each.link == robot.rows]
+    along = np.concatenate(parts or [np.array([at])]) - at
+    ends = np.array([along.min(), along.max()])
+    sense = float(np.sign(at if abs(at) > SHORTEST else ends.sum()))
+    return sense, float((sense * ends).max())
+
+
 def _length_without(bodies: Sequence[Body], start: Reals, end: Reals) -> float:
     """The length (m) of a line, with ends (3,), along which none of some bodies in the same frame reaches."""
     length = float(np.linalg.norm(end - start))

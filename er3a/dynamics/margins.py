@@ -23,7 +23,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -39,6 +39,7 @@ from er3a.robots.masses import GRAVITY, Load, MassBody, WristLoad, about
 from er3a.robots.robot import Grade, Robot
 
 Binding = Literal["peak", "rms", "speed"]
+NO_ROOM = 1e-6  # N m or N
 REAL = 1e-7
 """A root of a polynomial is real if its imaginary part is less, in parts of its size;
 whether the polynomial rises at it is asked so far beyond."""
@@ -96,6 +97,35 @@ def max_payload(t: Reals, without: Reals, per_kg: Reals, limits: DriveLimits) ->
     by_peak = np.where(np.abs(without) > limits.peak, 0.0, by_peak)
     squares = [time_mean(t, part) for part in (per_kg**2, 2 * per_kg * without, without**2)]
     return _least({"peak": by_peak, "rms": _by_rms(squares, limits.rated)[None]})
+
+
+def held_payload(robot: Robot, torques: Callable[[Reals], tuple[Reals, Reals]], limits: DriveLimits) -> Margin | None:
+    """The maximum payload that drives hold still in each pose within the limits, by search.
+
+    Parameters
+    ----------
+    torques : of poses (N, n), rad or m, without payload and what each kg adds, (N, n) each, N m or N
+    limits : of the drives; what is held for long must keep the rated torque, too
+
+    Returns
+    -------
+    margin : kg, 0 where a drive can't hold the arm itself; None where no limit of torque is known
+    """
+    if not limits.any_torque:
+        return None
+    allowed = np.fmin(limits.peak, limits.rated)
+
+    def share(q: Reals) -> Reals:
+        """Of the limit that is left, what each kg takes."""
+        without, per_kg = torques(q)
+        room = allowed - np.sign(per_kg) * without
+        return np.where(np.isfinite(room), np.abs(per_kg) / np.maximum(room, NO_ROOM), 0.0)
+
+    most = max_over_poses(robot, share).values
+    joint = int(most.argmax())
+    value = 1 / most[joint] if most[joint] > 0 else np.inf
+    by: Binding = "rms" if limits.rated[joint] < limits.peak[joint] else "peak"
+    return Margin(float(value) if value > 2 * NO_ROOM else 0.0, by, joint)
 
 
 def max_speed_scale(t: Reals, parts: tuple[Reals, Reals, Reals], velocity: Reals, limits: DriveLimits) -> Margin | None:

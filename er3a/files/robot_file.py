@@ -41,6 +41,7 @@ METRES_BELOW_MM, MIN_CENTRE_MM = 0.5, 0.02  # between them a link's centre of ma
 METRES_ABOVE_KG, FAR_WIDER = 0.5, 100.0  # ... of a link heavier than this, with a gyration radius so many times larger
 AS_PRINTED = {"as_printed": True}
 """The context in which a table's values may be another unit's."""
+MAX_NOTES = 50
 RADIANS_BELOW = 4.01 * math.pi  # an arm's widest limit, two turns, or its fastest joint, if written in radians
 
 IMPOSSIBLE = {
@@ -626,7 +627,8 @@ class CollisionPairs(StrictModel):
 class RobotFile(InputFile):
     """A robot file: data/robots/NAME.yaml.
 
-    ``visuals`` are how links look. They also show whether a link reaches out of its shapes.
+    ``visuals`` are how links look. They also show whether a link reaches out of its shapes. ``notes`` are what was left
+    out or assumed when a URDF was read; pages show them.
     """
 
     kind: Literal["robot"]
@@ -651,6 +653,7 @@ class RobotFile(InputFile):
     wrist_load: WristLoadGroup | None = None
     weight: Weight | None = None
     home_deg: JointsDeg | None = None
+    notes: Annotated[list[str], Field(max_length=MAX_NOTES)] = []
     _surfaces: tuple[LinkMesh, ...] = PrivateAttr(())
 
     @property

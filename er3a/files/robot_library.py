@@ -329,6 +329,7 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         tool=placement_transform(content.tool),
         zero_pose=content.zero_pose,
         references=tuple(content.references),
+        notes=tuple(content.notes),
         envelopes=tuple(
             Envelope(each.link, _metres(each.from_mm), _metres(each.to_mm), each.radius_mm / 1000)
             for each in (shapes.capsules if shapes else ())

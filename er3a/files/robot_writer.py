@@ -114,6 +114,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         "title": robot.title,
         "zero_pose": robot.zero_pose or "not stated",
         "references": list(robot.references),
+        "notes": list(robot.notes),
         "visuals": _surfaces(robot.visuals),
         "home_deg": None if robot.home is None else list(map(_tidy, shown(robot, robot.home))),
     }

@@ -59,7 +59,7 @@ ROUNDED_RAD = 2e-3  # of angles in three digits, of 1.57 and of 3.14
 MAX_BYTES = 20_000_000
 ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rather than an arm
 FINGER_JOINTS = 4
-GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
+GRIPPER, FINGER = re.compile("gripper|finger|jaw", re.IGNORECASE), re.compile("finger|jaw", re.IGNORECASE)
 SHOWN = 12
 CONTROLLER_BASE = "base"
 NAMED = re.compile(r'<robot\b[^>]*?\sname="([^"]+)"')
@@ -200,12 +200,15 @@ class Tree:
 
         Returns
         -------
-        begins : after ``ARM_JOINTS`` joints at least, where several short chains begin, or one joint named as a gripper
+        begins : after ``ARM_JOINTS`` joints at least, where several short chains begin, or one joint named as a
+            gripper; a link named so may be what a wrist turns
         """
         if count < ARM_JOINTS or any(self.depth[joint.name] > FINGER_JOINTS for joint in moving):
             return False
         alone = [
-            joint for joint in moving if self.depth[joint.name] == 1 and GRIPPER.search(f"{joint.name} {joint.child}")
+            joint
+            for joint in moving
+            if self.depth[joint.name] == 1 and (GRIPPER.search(joint.name) or FINGER.search(joint.child))
         ]
         return len(moving) > 1 or len(alone) == 1
 

@@ -52,6 +52,7 @@ GAPS: Mapping[str, Check] = {
     "gripper": "scene_collision",
     "gravity": "torque",
     "program_loads": "torque",
+    "no_torque_limits": "torque",
     "paths_not_run": "torque",
     "arm_errors": "camera",
     "out_of_view": "camera",

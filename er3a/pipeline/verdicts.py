@@ -17,7 +17,7 @@ from typing import Literal
 from er3a.by_value import frozen
 from er3a.files.kept_files import write_atomically
 from er3a.pipeline import language
-from er3a.pipeline.messages.say import joined, say_all, sentence
+from er3a.pipeline.messages.say import joined, listed, sentence
 from er3a.pipeline.messages.scope import assumed_text, covered_text, missed_text
 from er3a.pipeline.results import (
     Foundation,
@@ -155,9 +155,9 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str, said: dic
     )
     if verdict.status == "caution" != expected:
         said |= {gap: Open("as_above", (name,)) for gap in gaps} | said
-    text = say_all(replace(verdict, missed=missed).findings)
-    sentences = 2 if verdict.lowered and not again else 1  # the second is why
-    answer = f"{'. '.join(text.split('. ')[:sentences]).removesuffix('.')}."
+    lines = listed(replace(verdict, missed=missed).findings)
+    text, own = joined(lines, " "), lines[: 2 if verdict.lowered and not again else 1]  # the second is why
+    answer = joined([f"{each.split('. ')[0].removesuffix('.')}." for each in own], " ")
     outdated = changed_since(folder, study, robot, name)
     if outdated:
         text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)

@@ -179,6 +179,7 @@ class Robot(ByValue, Displayed):
     pair_rules : pairs of links that the robot file allows, or requires to be checked
     masses : of links, and the limits of drives and wrist, as far as known
     home : (n,), rad or m, where the arm rests and places are joined to; None if its file gives none
+    notes : what was left out or assumed when a URDF was read, in words
     derived : what :func:`er3a.robots.robot.derived` keeps of this robot
     sources : for each group of values ("dh", "zero", "limits", "speeds", "base", "flange", "tool", "envelopes",
         "inertia", "drives", "wrist_load", "weight") its source and grade
@@ -220,6 +221,7 @@ class Robot(ByValue, Displayed):
     pair_rules: tuple[PairRule, ...] = ()
     masses: Masses = field(default_factory=Masses)
     home: Reals | None = None
+    notes: tuple[str, ...] = field(default=(), compare=False)
     sources: Mapping[str, Source] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)

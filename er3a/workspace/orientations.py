@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.by_value import by_identity
+from er3a.collision.shapes import outward
 from er3a.geometry.transforms import exp_rotation
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.by_class import arm_solver, with_task_frame
@@ -224,10 +225,9 @@ def along_last_axis(robot: Robot) -> tuple[Robot, str]:
     robot : with its tool frame turned, z outward; the same where a tool is given or z is along that axis
     name : of the flange's axis that is z there, "z" of the same robot
     """
-    last = constant_links(robot)[-1]
-    axis, outward = last[2, :3], last[:3, :3].T @ last[:3, 3]
+    axis = constant_links(robot)[-1][2, :3]
     k = int(np.abs(axis).argmax())
-    z = axis * (np.sign(axis @ outward) or np.sign(axis[k]))
+    z = axis * (outward(robot)[0] or np.sign(axis[k]))
     if robot.slides[-1] or z[2] > _ALONG or abs(axis[k]) < _ALONG or not np.array_equal(robot.tool, np.eye(4)):
         return robot, "z"
     x = np.cross(np.eye(3)[(k + 1) % 3], z)

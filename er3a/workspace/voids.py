@@ -227,7 +227,7 @@ def inside_hull(corners: Reals, points: Reals) -> Flags:
 
 POCKET_BLOCKS, TURNS = 64, 180  # across the section and around, on which pockets are searched
 MESH_BLOCKS, MESH_TURNS = 24, 72  # across a void and around, for its picture
-_SPECK_M3 = 1e-9  # 1 mm^3: smaller voids are not listed
+_SPECK_M3 = 1e-6  # 1 mL: smaller voids are not listed, nor counted
 
 
 @by_identity

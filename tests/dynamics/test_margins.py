@@ -12,13 +12,14 @@ import er3a
 from er3a.dynamics.arm_model import arm_model
 from er3a.dynamics.margins import (
     DriveLimits,
+    held_payload,
     levers,
     max_payload,
     max_speed_scale,
     worst_levers,
     wrist_use,
 )
-from er3a.dynamics.torques import demand, torque_parts, worst_holding
+from er3a.dynamics.torques import demand, holding_torques, torque_parts, worst_holding
 from er3a.robots.joint_limits import within
 from er3a.robots.masses import Drives, LinkMass, Load, MassBody, Masses, WristLoad
 from er3a.robots.robot import CombinedLimit, Robot
@@ -45,6 +46,19 @@ def arm() -> Robot:
         peak=PEAK,
     )
     return robot.replace(masses=replace(robot.masses, drives=drives), speed=np.full(6, 4.0))
+
+
+@pytest.mark.parametrize("rated", [UNKNOWN, np.array([20.0, 41.0, 20.0, 7.0, 4.0, 2.0])])
+def test_a_held_payload_breaks_no_limit_in_any_pose_and_a_heavier_one_does(arm, rated, random):
+    def torques(q: np.ndarray, kg: float) -> np.ndarray:
+        return holding_torques(arm_model(arm, Load(kg, (0.0, 0.0, 0.1))), q)
+
+    found = held_payload(arm, lambda q: (torques(q, 0.0), torques(q, 1.0) - torques(q, 0.0)), limits(rated=rated))
+    allowed, q = np.fmin(PEAK, rated), random.uniform(arm.lower, arm.upper, (20_000, 6))
+    assert 0.5 < found.value < 20
+    assert (np.abs(torques(q, found.value)) <= allowed).all()
+    assert (np.abs(torques(q, 1.15 * found.value)) > allowed)[:, found.joint].any()
+    assert found.by == ("peak" if np.isnan(rated).any() else "rms")
 
 
 def path(count: int = 301) -> np.ndarray:

@@ -131,6 +131,8 @@ def test_grippers_and_linkages_that_only_follow_are_left_out(written):
     assert [each.link for each in alone.robot.hulls] == [6]
     assert alone.robot.sources["envelopes"].grade == "export"
     assert any("gripper_joint" in note for note in alone.notes)
+    wrist = joint("joint_6", "revolute", "l4", "no_gripper")
+    assert import_urdf(written(row(5), wrist)).robot.joints == 6
 
 
 def test_followers_in_the_chain_become_coupling(written, random, tmp_path):

@@ -539,21 +539,23 @@ def test_the_payload_is_one_line_with_what_limits_it_and_what_is_not_known(full)
     """Least of all paths that count, rounded down; what is missing is counted there and named behind it."""
     study, found = full
     summary, robot = found.results.summary, study.robot("er3a_c60")
-    least = min((path for path in summary.paths if path.counts), key=lambda path: path.payload.value)
+    named = [(path.payload, path.name) for path in summary.paths if path.counts]
+    least, name = min([*named, (summary.held_payload, "holding still")], key=lambda each: each[0].value)
     lead = dynamics.payload_text(summary, robot)
-    down = np.floor(100 * least.payload.value) / 100
-    by = {"rms": "RMS", "peak": "peak"}[least.payload.by]
-    limit = f"At most {down:.2f} kg, limited by torques: J{least.payload.joint} ({by}), {least.name}."
+    down = np.floor(100 * least.value) / 100
+    by = {"rms": "RMS", "peak": "peak"}[least.by]
+    limit = f"At most {down:.2f} kg, limited by torques: J{least.joint} ({by}), {name}."
     assert lead.startswith(limit)
     assert "not known" not in lead
     unknown = replace(
         summary,
         paths=(),
+        held_payload=None,
         assumed=(Open("link_masses", ("6",)), Open("peak_torques"), Open("mounting")),
     )
     lead = dynamics.payload_text(unknown, robot)
-    assert lead.startswith("Quantities not known: 2. Mount nothing until the manufacturer gives the rated payload.")
-    assert dynamics.payload_text(None, robot).startswith("Not examined. Mount nothing")
+    assert lead.startswith("Quantities not known: 2. No document of the maker gives the payload.")
+    assert dynamics.payload_text(None, robot).startswith("No document of the maker")
 
 
 @pytest.mark.parametrize("grade", ["official", "claim"])
@@ -565,7 +567,7 @@ def test_a_rated_payload_counts_as_its_source_does(grade):
     said = dynamics.payload_text(None, robot.replace(sources={**robot.sources, "wrist_load": source}))
     official = "Rated payload: 3 kg (Quick manual (EC2-S cabinet), table 2-2); wrist moments and inertias unknown"
     assert (official in said) == (grade == "official")
-    assert ("Mount nothing" in said and "nothing confirms" in said) == (grade == "claim")
+    assert ("No document" in said and "nothing confirms" in said) == (grade == "claim")
 
 
 def test_the_loads_moments_along_a_path_have_tolerances(full):

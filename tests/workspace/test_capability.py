@@ -14,7 +14,8 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
-from er3a.robots.robot import Robot
+from er3a.pipeline.stages.covered import assumed_tool
+from er3a.robots.robot import ConvexPiece, Robot
 from er3a.workspace.capability import manipulability, map_capability
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
@@ -131,6 +132,18 @@ def test_a_tool_points_along_the_last_axis_whatever_the_flanges_axes_are_called(
     assert said == name
     np.testing.assert_allclose(forward(found, q)[:, :3, 2:], forward(robot, q)[:, :3, 2:], atol=1e-9)
     assert np.linalg.det(forward(found, q[0])[:3, :3]) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(("ends", "name"), [((0.02, 0.07), "z"), ((-0.07, -0.02), "−z")])
+def test_of_a_flange_at_the_wrist_the_last_links_shape_says_where_out_is(ends, name):
+    robot = load_robot("irb120")
+    piece = ConvexPiece(6, tuple((x, y, z) for x in (0.0, 0.02) for y in (0.0, 0.02) for z in ends), 0.0)
+    robot = robot.replace(d=np.array([*robot.d[:5], 0.0]), flange=np.eye(4), envelopes=(), meshes=(), hulls=(piece,))
+    assert along_last_axis(robot)[1] == name
+    assert [(each.reason, each.amount) for each in assumed_tool(robot)] == [
+        ("tool", None),
+        ("beyond_flange", pytest.approx(70)),
+    ]
 
 
 def test_a_moved_base_changes_no_number():

@@ -82,8 +82,9 @@ TEXTS = texts(
         "dynamics.torque": "{torque:.3g} ± {tolerance:.2g} {unit} (J{joint}, {path:dynamics.path})",
         "dynamics.fits": "Within all stated limits; highest utilisation: {tightest}.{rest}",
         "dynamics.marginal": (
-            "Within the stated limits, but {masses:dynamics.masses}; highest utilisation: {tightest}.[ Not examined: "
-            "{unknown}. Enter payload and tool_load in the study, drives and wrist_load in the robot's file.]{rest}"
+            "Within the stated limits[, but masses are uncertain{masses:?}][{masses:!}{unknown:?}, but {first}]; "
+            "highest utilisation: {tightest}.[ Not examined: {unknown}. Enter payload and tool_load in the study, "
+            "drives and wrist_load in the robot's file.]{rest}"
         ),
         "dynamics.overload": "Overload: {beyond} of {compared} comparisons beyond limits; worst: {tightest}.{rest}",
         "dynamics.rest": (
@@ -109,8 +110,7 @@ TEXTS = texts(
         "sum_off_weight": "links' masses: {sum_kg:.4g} kg; the manufacturer's weight: {weight_kg:.4g} kg",
         "payload": (
             "[At most {kg} kg, limited by torques: {by:, }.][ It rests on guesses: {guesses:; }.][{unknown:?} "
-            "Quantities not known: {unknown}.][{unexamined:?} Not examined.][{none:?} Mount nothing until the "
-            "manufacturer gives the rated payload.][ {rated}]"
+            "Quantities not known: {unknown}.][{none:?} No document of the maker gives the payload.][ {rated}]"
         ),
         "payload.rated": "Rated payload: {kg:.3g} kg ({source:payload.source}); {doubt:payload.doubt}.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why:dynamics.why})",
@@ -121,7 +121,6 @@ WORDS.update(
         {
             "dynamics.why": WHY,
             "dynamics.path": {None: "holding still"},
-            "dynamics.masses": {True: "masses are uncertain", False: "loads, ratings or paths are left out"},
             "dynamics.massless": {
                 False: "it counts as massless",
                 True: "its joint's torque counts as 0, and forward dynamics has no value",
@@ -138,13 +137,13 @@ WORDS.update(
 
 
 def _least(summary: Summary | None) -> tuple[str, list[str]] | None:
-    """The least payload that the paths allow, and what limits it; None where none has a bound."""
-    paths = summary.paths if isinstance(summary, model.DynamicsSummary) else ()
-    bounds = [
-        (path.payload.value, path.payload, path.name)
-        for path in paths
-        if path.counts and path.payload and path.payload.value is not None
-    ]
+    """The least payload that the paths, and holding still in the worst pose, allow, and what limits it; None where
+    none has a bound."""
+    if not isinstance(summary, model.DynamicsSummary):
+        return None
+    named = [(path.payload, path.name) for path in summary.paths if path.counts]
+    named += [(summary.held_payload, word("dynamics.path", WORDS["dynamics.path"], None))]
+    bounds = [(most.value, most, name) for most, name in named if most and most.value is not None]
     if not bounds:
         return None
     value, most, path = min(bounds, key=itemgetter(0))
@@ -185,7 +184,7 @@ def payload_text(summary: Summary | None, robot: Robot) -> str:
     official = _rated(robot, official=True)
     kg, by = least or (None, ())
     parts: dict[str, Any] = {"kg": kg, "by": by, "guesses": _guesses(summary) if least else ()}
-    parts |= {"unknown": len(missing), "unexamined": not (least or missing), "none": not (least or official)}
+    parts |= {"unknown": len(missing), "none": not (least or official)}
     return sentence("payload", rated=official or _rated(robot), **parts)
 
 
@@ -229,5 +228,6 @@ says("dynamics.use")(use_text)
 def _(found: Finding) -> str:
     rest = sentence("dynamics.rest", **{"not_run": (), **found.params})
     masses = bool(found.params.get("unsettled") or found.doubts or found.grade == "inferred")
-    unknown = joined((tr(ASSUMED[each]) for each in found.params.get("unknown", ())), "; ")
-    return say_as(found, masses=masses, unknown=unknown, rest=f" {rest}" if rest else "")
+    unknown = [tr(ASSUMED[each]) for each in found.params.get("unknown", ())]
+    first = unknown[-1] if unknown else ""  # of the load, where the study leaves that open
+    return say_as(found, masses=masses, unknown=joined(unknown, "; "), first=first, rest=f" {rest}" if rest else "")

@@ -52,6 +52,7 @@ GAP_WORDS: Mapping[str, str] = words(
         "gravity": "gravity is set to {amount:g} m/s²",
         "paths_not_run": "paths that may not be run",
         "program_loads": "loads that programs name",
+        "no_torque_limits": "no motor's limit is known",
         "arm_errors": "the file does not state all of the arm's own errors",
         "out_of_view": "objects out of the camera's stated view",
         "flange_frame": "the recorded poses may be a tool's, not the flange's",
@@ -71,6 +72,7 @@ ASSUMED: Mapping[str, str] = words(
         "own_speeds": "limits of joint speeds (once they are confirmed, begin at 10 % override)",
         "own_accelerations": "limits of joint accelerations",
         "tool": "no tool: the flange's centre is the tip",
+        "beyond_flange": "the last link's shape goes on {amount:.0f} mm beyond the flange, where reach is counted to",
         "carried": "nothing is carried",
         "guessed_pairs": "pairs of links for which guessed shapes are too coarse",
         "base_contacts": "the base is mounted on these solids",
@@ -81,7 +83,6 @@ ASSUMED: Mapping[str, str] = words(
         "program_load": "loads that programs name",
         "capability": "tool directions were not computed",
         "places": "no place for the tray was looked for",
-        "tray_nowhere": "no place for the tray was found",
         "references": "what no document states",
         "loose_references": "references too loose to tell",
         "tool_and_base": "the study's tool and base",
@@ -182,9 +183,14 @@ def covered_text(found: Coverage) -> str:
     return sentence("coverage", covered=covered, of=found.of, **marks)
 
 
+def why_not_all(found: Coverage, most: int | None) -> str:
+    """The reasons, with ``most`` names of each; of a check without any the one before it says them."""
+    return joined([gap_text(gap, most) for gap in found.gaps], ", ") or gap_text(Open("as_above"))
+
+
 def missed_text(found: Coverage) -> str:
     """A check that does not cover all, and why."""
-    gaps = joined(map(gap_text, found.gaps), ", ") or covered_text(found)
+    gaps = why_not_all(found, MAX_NAMED)
     return sentence("not_checked.one", check=check_name(found.check), gaps=gaps)
 
 

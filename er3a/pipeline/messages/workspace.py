@@ -27,15 +27,15 @@ TEXTS = texts(
     {
         "workspace.flat": "The tool point moves on a surface, on a line or not at all: there is no volume.",
         "workspace.unsettled": "Voids can't be judged: {undecided_percent:.2g} % of the volume is undecided.",
-        "workspace.no_void": "No enclosed void is found; {undecided_percent:.2g} % of the volume is undecided.",
+        "workspace.no_void": "No enclosed void of 1 mL is found; {undecided_percent:.2g} % of the volume is undecided.",
         "workspace.void_unexpected": (
             "An enclosed void of at least {litres:at_least L} L lies away from the shoulder, at ({x_mm:.0f}, "
             "{y_mm:.0f}, {z_mm:.0f}) mm. Cause: {cause}. Never widen a limit of the arm for it. That is not "
             "normal: a limit, a zero or a direction of joint 2 or 3 may be wrong."
         ),
         "workspace.void_at_shoulder": (
-            "An enclosed void of at least {litres:at_least L} L surrounds the shoulder: normal. Its centre is "
-            "({x_mm:.0f}, {y_mm:.0f}, {z_mm:.0f}) mm; no other enclosed one was found."
+            "No enclosed void but that about the shoulder, which is normal. It is {litres:at_least L} L at least; its "
+            "centre is ({x_mm:.0f}, {y_mm:.0f}, {z_mm:.0f}) mm."
         ),
         "void_disappears": "{limits:limit, }; it disappears at {extended:extended or }",
         "void_of_several_limits": "several limits together[; {most}]",

@@ -55,10 +55,9 @@ def arm_of(source: str | Path, **form: Any) -> Arm:
     if not (holds_table(source) or path.suffix in URDF or known_arm(str(source)) or form.get("srdf")):
         return _of_file(robot_path(source))
     arm = read_arm(str(source), whole=True, **form)
-    content = robot_file(arm.robot, path)
-    robot = robot_of(content)
-    notes = (*arm.notes, *(() if arm_shapes(robot).given else (NO_SHAPES,)))
-    return Arm(robot, SCHEMA_LINE + robot_text(content), notes)
+    notes = (*arm.notes, *(() if arm_shapes(arm.robot).given else (NO_SHAPES,)))
+    content = robot_file(arm.robot.replace(notes=notes), path)
+    return Arm(robot_of(content), SCHEMA_LINE + robot_text(content), notes)
 
 
 def _of_file(path: Path) -> Arm:

@@ -13,7 +13,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import base_contacts
 from er3a.collision.pairs import PENETRATION_TOLERANCE, label_of, link_label
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import COVERED, arm_shapes, depths_in, has_bare_tool
+from er3a.collision.shapes import COVERED, arm_shapes, depths_in, has_bare_tool, outward
 from er3a.errors import DoubtfulUnit
 from er3a.files.kept_files import shown_path
 from er3a.geometry.transforms import rotation_angle
@@ -168,8 +168,11 @@ def gaps_in_solids(scene: Scene | None, places: Iterable[tuple[str, Reals, float
     return (Open("inside_solid", tuple(found)),) if found else ()
 
 
+BEYOND_M = 0.01  # of a last link's shape, beyond which the flange is not its end: bosses and bolts stand out less
+
+
 def assumed_tool(robot: Robot) -> tuple[Open, ...]:
-    """That the flange's centre was taken for a tool's tip.
+    """That the flange's centre was taken for a tool's tip, and where it is not the end of the last link.
 
     Parameters
     ----------
@@ -179,7 +182,10 @@ def assumed_tool(robot: Robot) -> tuple[Open, ...]:
     -------
     assumed : none if the file, or the study, gives a tool
     """
-    return () if "tool" in robot.sources or not np.array_equal(robot.tool, np.eye(4)) else (Open("tool"),)
+    if "tool" in robot.sources or not np.array_equal(robot.tool, np.eye(4)):
+        return ()
+    beyond = outward(robot)[1]
+    return (Open("tool"), *([Open("beyond_flange", (), 1000 * beyond)] if beyond > BEYOND_M else []))
 
 
 ORIENTATION_OFF_DEG = 0.1  # of what an arm of few joints can't set; poses with two decimals of deg are off by less

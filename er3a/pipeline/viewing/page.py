@@ -34,7 +34,7 @@ from er3a.pipeline.messages.numbers import (
 )
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text
+from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text, why_not_all
 from er3a.pipeline.results import (
     AbsentResults,
     Provenance,
@@ -252,7 +252,7 @@ def head_of(stored: Stored[Any]) -> Head:
         (
             check_name(each.check),
             covered_text(each),
-            "" if each.complete else joined([gap_text(gap, None) for gap in each.gaps], ", ") or covered_text(each),
+            "" if each.complete else why_not_all(each, None),
         )
         for each in summary.checked
         if each.check not in UNSAID or each.gaps

@@ -180,8 +180,9 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     closest = nearest = (*at_targets, *on_paths)
     if steady := _steady(bodies, closest):
         targets, paths, nearest = _but_steady(bodies, steady, study.entry(name).targets, motions, tolerance)
+    in_view = [each for each in nearest if each.kind == "target"]
     assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
-    free = _free_space(space, places_found, at_targets, blocked, _colliding(motions, on_paths, first_touch)).but(
+    free = _free_space(space, places_found, in_view, blocked, _colliding(motions, on_paths, first_touch)).but(
         shapes_assumed=assumed is not None
     )
     covered = covered_collisions(robot, bodies, scene)
@@ -242,7 +243,7 @@ def _steady(bodies: Bodies, closest: Sequence[model.Closest]) -> tuple[model.Ste
     steady = (low > 0) & (spread <= STEADY_MM) & (joints <= STEADY_JOINTS)
     if steady.all():
         return ()
-    nearer = np.flatnonzero(steady & (low < far[:, ~steady].min(axis=1).max()))
+    nearer = np.flatnonzero(steady & (low < min(model.NEAR_MM, far[:, ~steady].min(axis=1).max())))
     order = nearer[np.argsort(low[nearer], kind="stable")]
     return tuple(model.SteadyPair(bodies.pairs[pairs[k]], float(low[k]), float(low[k] + spread[k])) for k in order)
 

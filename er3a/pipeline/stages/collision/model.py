@@ -57,6 +57,9 @@ class Closest:
     to_mm: tuple[float, float, float]
 
 
+NEAR_MM = 50.0  # what is farther from an arm decides nothing
+
+
 @frozen
 class SteadyPair:
     """Two bodies that are as near in all targets' and paths' nearest poses, and how near they are there, mm."""

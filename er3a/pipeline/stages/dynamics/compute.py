@@ -386,6 +386,18 @@ def _margins(
     )
 
 
+def _held_payload(arm: LoadedArm) -> model.BindingLimit | None:
+    """The largest further payload that the drives hold still wherever the arm is."""
+    drives = drives_of(arm.robot)
+
+    def held(q: Reals) -> tuple[Reals, Reals]:
+        without = holding_torques(arm.model, q)
+        return without, holding_torques(arm.with_unit, q) - without
+
+    limits = margins.DriveLimits(drives.peak, drives.rated, arm.robot.speed)
+    return _bound(margins.held_payload(arm.robot, held, limits), np.zeros(1))
+
+
 def _wrist_moments(
     arm: LoadedArm, t: Reals, q: Reals, qd: Reals, qdd: Reals, wrist: tuple[int, ...]
 ) -> tuple[model.WristMoment, ...]:
@@ -496,6 +508,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         findings=findings,
         payload_centre_mm=tuple(settings.payload_centre_mm),
         payload_gyration_mm=settings.payload_gyration_mm,
+        held_payload=_held_payload(arm) if moving else None,
         paths=summaries,
         holding=holding,
         motors=motors,
@@ -551,6 +564,7 @@ def _checked(
     not_run = tuple(path.summary.name for path in own if not path.summary.counts)
     gaps = [*rest, *([Open("gravity", amount=settings.gravity_m_s2)] if elsewhere else [])]
     gaps += [Open("paths_not_run", not_run)] if not_run else []
+    gaps += [] if limited else [Open("no_torque_limits")]
     counts = (len(own), len(own))
     covered = len(own) - len(not_run) if limited else 0
     asked: dict[Check, tuple[int, int]] = {"torque": (covered, len(own)), "limits": counts}

@@ -263,6 +263,7 @@ class DynamicsSummary(Summary):
     ----------
     masses : None where there are none
     payload_centre_mm, payload_gyration_mm : of the payload whose largest mass is asked for
+    held_payload : the largest that the drives hold still in each pose, by search; None where no limit is known
     uses : all that was compared with a limit, the tightest first
     """
 
@@ -273,6 +274,7 @@ class DynamicsSummary(Summary):
     findings: tuple[Finding, ...]
     payload_centre_mm: tuple[float, ...]
     payload_gyration_mm: float
+    held_payload: BindingLimit | None
     paths: tuple[PathLoad, ...]
     holding: tuple[HoldingTorque, ...]
     motors: tuple[MotorNeed, ...]

@@ -189,8 +189,6 @@ def _assumed(tool: ToolCapability) -> Iterator[Open]:
         yield Open("capability")
     elif is_one(placement, "workspace.placement_too_long"):
         yield Open("places")
-    elif placement and not getattr(placement, "named_places", ()):
-        yield Open("tray_nowhere", (f"{' × '.join(f'{edge:g}' for edge in placement.task.box_mm)} mm",))
 
 
 def _in_solids(robot: Robot, scene: Scene | None, found: model.Placement | None) -> Iterator[Open]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import own_title, tr, with_unit
-from er3a.pipeline.messages.collision import HOMES, state_word, why
+from er3a.pipeline.messages.collision import HOMES, clearance_text, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.scope import body_word
@@ -97,12 +97,10 @@ def _answer(
     caught = len(params.get("demonstrations", ()))
     due = len(rows) + blocked - caught - len(partly)
     headline = tr("{count} of {due} poses and paths clear.", count=len(clear + elsewhere), due=due)
-    least = [(each.clearance_mm, each.name) for each in closest]
-    least += [(each.least_mm, say(each.between)) for each in summary.steady]
     keys = [
-        (with_unit(fixed(far, 1), "mm"), tr("least clearance: {name}", name=name))
-        for far, name in sorted(least)
-        if far >= 0
+        (with_unit(fixed(each.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=each.name))
+        for each in closest
+        if each.clearance_mm >= 0
     ][:1]
     titled = (
         (tr("Collide"), hit),
@@ -132,7 +130,7 @@ def _row(
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
     which only a part was measured; ``span_mm``: of the whole bar, on which an overlap is left of 0,
     with ``lines_mm`` across it."""
-    note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
+    note = clearance_text(found.clearance_mm, found.between)
     of_path = found.kind == "path"
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     if of_path and found.name in unreached and mark != "fail":

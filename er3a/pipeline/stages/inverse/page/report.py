@@ -12,6 +12,7 @@ from markupsafe import Markup
 from er3a.collision.bodies import Bodies
 from er3a.finding import is_one
 from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.messages.collision import clearance_text
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import NEAREST_RULE
 from er3a.pipeline.messages.kinematics import branch_word
@@ -189,7 +190,7 @@ def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:
 
 def _clearance(target: model.TargetResult) -> str:
     near = target.clearance
-    return tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else ""
+    return clearance_text(near.least_mm, near.between) if near else ""
 
 
 def _branch_rows(branches: model.SolutionRows) -> list[list[str]]:

@@ -12,10 +12,11 @@ import numpy as np
 from er3a.comparison.compare import shift_between
 from er3a.kinematics.forward import forward
 from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.messages.collision import clearance_text
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, say
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import (
     kind_word,
     path_text,
@@ -175,7 +176,7 @@ def _clear_of(path: model.PathSummary) -> str:
     """How near a path that passes comes to anything; empty where that is not known."""
     if path.clearance is None or path.verdict != "safe":
         return ""
-    return tr("{far} mm clear: {pair}.", far=fixed(path.clearance.least_mm, 1), pair=say(path.clearance.between))
+    return whole_sentence(tr("clear by {far}", far=clearance_text(path.clearance.least_mm, path.clearance.between)))
 
 
 def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:

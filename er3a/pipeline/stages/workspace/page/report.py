@@ -7,6 +7,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from er3a.finding import is_one
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed
@@ -39,7 +40,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     payload = joined([payload_text(known, robot), there], " ")
     trays = [each.tray for each in placing.tried] if placing else []
     settled = stored.table != "unsettled"
-    rows = _tray_as_rows(placing, settled)
+    looked = summary.placement is not None and not is_one(summary.placement, "workspace.placement_too_long")
+    rows = _tray_as_rows(placing, settled) if looked else []
     answer = _answer(summary, placing, payload_key(known, robot), rows)
     arms = [(robot, results)]
     instead = alternative_table(study, stored.robot, stored.folder) if contradicted else None
