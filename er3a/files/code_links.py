@@ -68,7 +68,7 @@ def links_of(code: Code) -> tuple[list[Grid], list[Grid], Lists]:
         code.refuse(unread[0].start, unread[0].inside, "can't be read as a link", "Write its numbers there")
     if not lists.taken:
         rows, own = sorted(rows + own, key=lambda row: row.place), []
-    _assigned(code, rows)
+    _assigned(code, rows, lists)
     if rows and (re.search(_ADDED, code.text) or len(rows) == 1 or len({*lists.loops}) < len(lists.loops)):
         code.refuse(rows[0].place, ", ".join(_constants(rows[0].cells)), *_OF_LOOP)
     if not lists.taken:
@@ -255,7 +255,7 @@ _SET = re.compile(
 )
 
 
-def _assigned(code: Code, rows: list[_Link]) -> None:
+def _assigned(code: Code, rows: list[_Link], lists: Lists) -> None:
     """Carry out what is set after a link was made: ``L(2).offset``, ``robot.offset(2)``, ``robot.links(2).offset``."""
     text = re.sub(r"\.links(\(\d+\))\.(\w+)", r".\2\1      ", code.text)  # as long as it was
     for found in _SET.finditer(text) if rows else ():
@@ -268,7 +268,11 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
         ]
         for row, key in given:
             row.cells[key] = found[4].strip()
-        if not given:
+        whole = lists.values.get(found[2], ()) if found[1].isidentifier() else ()
+        if not given and isinstance(whole, list) and len(whole) == len(rows):  # robot.offset = DH(:, 4)'
+            for row, cell in zip(rows, whole):
+                row.cells[found[2]] = cell
+        elif not given:
             code.refuse(found.start(), name, "is set for a link that is not found", "Write it into the link's call")
 
 

@@ -35,7 +35,7 @@ _NAMED = re.compile(
     (?:\[(?:\d*|[A-Z]\w*)\]|\(1:\w+\))?\s*                 # C's a[6] or a[N], MATLAB's a(1:6)
     (?::(?:[ ]*\[\w+;[ ]*\d+\][ ]*|[^=:\n"'\d]*)(?==))?   # its type: Rust's a: [f64; 6] =, Python's a: list =
     (?P<mark>[=:])\s*
-    (?:[\w.]+\(\s*|np\.r_\s*|c|\[[\d.]*\]\w+)?["']?\s*$   # np.array(, np.r_, R's c(, Go's []float64
+    (?:[\w.]+\(\s*|new\s+\w+\[\d*\]\s*|np\.r_\s*|c|\[[\d.]*\]\w+)?["']?\s*$   # np.array(, np.r_, R's c(, Go's []float64
     """,
     re.VERBOSE,
 )
@@ -77,12 +77,15 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
         text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b|π|2rad|radians", "π", " ".join(cells), flags=re.I)
         if quantity == "theta" and mark == "=" and not re.search(r"[^\W\dπ]", text):
             quantity = "pose" if name != "q" and re.search("[1-9π]", text) else ""
-            summed = re.search(_SUMMED.replace("NAME", name), program) or "dh" in name.lower()
+            summed = re.search(f"{_SUMMED.replace('NAME', name)}|DQ_SerialManipulator", program) or "dh" in name.lower()
             quantity = "offset" if summed else quantity
         quantity = "alpha" if quantity == "a" and "π" in text else quantity
         if quantity == "a" and name[0] in "rR" and columns.get("a", "r")[-1][0] not in "rR":
             quantity = "d"  # Khalil's r, with a
         of_others = name in "Ll" and columns.get("a", "r")[-1] not in "rR"
+        if not heading and "theta" not in columns and len(re.findall(_ANGLES, ",".join(cells))) > 1:
+            others = columns.get("a", ("", []))[1]  # a list of theta by another name, as long as the rest
+            quantity = "theta" if len(others) == len(cells) else quantity
         if quantity not in _OF_VECTORS or not cells or of_others:
             continue
         as_printed = "r" if name == "r" and quantity == "a" else quantity
@@ -138,6 +141,9 @@ _SUMMED = (
     r"\bNAME\s*\+\s*VALUES(?!\s*[*/.\w\[(])|(?<![\w.])VALUES\s*\+\s*NAME\b"
 ).replace("VALUES", "(?:q|theta|thetas|joints|joint_angles)")
 """A list that is added to values of joints, as a whole or one by one."""
+
+
+_ANGLES = r"(?:^|,)[-+\w.*/ ]*?\b(?:q|th|t[eh]{1,2}ta|θ)_?\d+[-+\w.*/ ]*(?=,|$)"
 
 
 _OF_VECTORS = words_of("a alpha beta d theta offset type direction pose")
@@ -250,7 +256,7 @@ def _numbers(over: str) -> tuple[int, str, bool] | None:
         end = condition.partition("<")[2]
     else:
         first, _, end = over.partition(":")
-    first, end = first.strip() or "0", end.strip()
+    first, end = first.strip() or "0", end.strip().removeprefix("1:") if ":" in over else end.strip()
     closed = ":" in over or end.startswith("=")
     return (int(first), end.lstrip("= "), closed) if first.isdigit() and end else None
 

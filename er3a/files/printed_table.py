@@ -86,7 +86,7 @@ SIGNS = {
     "modified": re.compile(
         rf"{_TURN}x{_THEN}{_TURN}z\b|"
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
-        r"(?<![a-z])(?:revolute|serialmanipulator)?(?:mdh|moddh)(?![a-z])|改进|修改\s*d-?h|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
+        r"(?<![a-z])(?:revolute|serialmanipulator)?(?:mdh|moddh|dhm)(?![a-z])|khalil|改进|修改\s*d-?h|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
         r"(?:(?:sin|cos)\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\b[sc]a)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
         r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:(?:sin|cos)\([^\n,;*]{0,30}(?:al|α)|[sc]a\b)|"
         r"cos\((?P<twist>[^\n;]{1,40}?)\)[\s,;]+-(?:\w+\.)*sin\((?P=twist)\)[\s,;]+-[^,;\n]{0,40}sin\((?P=twist)\)",
@@ -118,12 +118,17 @@ _GIVEN = re.compile(
 )
 """A name that has a value."""
 
-_JOINT = re.compile(r"(?<!\w)(?:q|θ|th|theta|t)_?[\[(]?\d")
+_OF_JOINT = r"(?:q|θ|th|theta|t|ang[a-z]*|joint[a-z]*|servo|motor)"
+_JOINT = re.compile(rf"(?<!\w){_OF_JOINT}_?[\[(]?\d")
 """A variable of a joint, which one of another name may be given by: ``theta2 = q2 - pi/2``."""
 _CHAIN = re.compile(
     r"(?<![=!<>])=(?=[^=\n]*[-+*/^(])[ \t]*-?[\w.()]+(?:[ \t]*[-+*/^][ \t]*[\w.()]+)*[ \t]*=(?=[ \t]*[-+.\d])"
 )
+_BOTH = re.compile(r"(?<![\w.])([^\W\d]\w*)[ \t]*=[ \t]*(?=[^\W\d]\w*[ \t]*=[ \t]*([-+\d.]+(?:[ \t]*(?:mm|cm|m)\b)?))")
+"""One of two names that have a value, ``a2 = a3 = 125 mm``."""
 _SEVERAL = re.compile(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$")
+_ROW_SAID = r"(?m)^[ \t]*(?://|#|%)+[ \t]*([^\W\d]+)[ \t]*(\d)[ \t]*(?=:[ \t]*\[[^\]\n,]*,[^\]\n,]*,[^\]\n]*\][ \t]*$)"
+"""The mark of a comment before a row, ``// Link 1: [0, 0, 135, th1]``."""
 _NAMED_SUM = re.compile(r"[-+*/]\s*(?![qθ]|th)[^\W\d]|(?![qθ]|th)[^\W\d]\w*\s*[-+*/]")
 """Arithmetic with a constant that has a name, as a drawing has it and no pose."""
 _IN_UNIT = re.compile(
@@ -207,6 +212,9 @@ def printed_table(
         (found, from_code), *others = _tables(text, columns)
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
+    if not found and (bare := re.sub(_ROW_SAID, r"\1\2", text)) != text:
+        with suppress(InputError):
+            (found, from_code), *others = _tables(bare, columns)
     tables = [*{str([row for _, row in table]): table for table in found[:9]}.values()]
     ranks = [(*_has_twists(table), "theta" in map(place_of, table[0][1])) for table in tables]
     if from_code:  # which has colours, poses and symbols, too
@@ -296,15 +304,19 @@ def _tables(text: str, columns: Sequence[str]) -> list[tuple[list[Grid], bool]]:
     """All tables of the first reader that finds one, their headings first, and whether they are a program's; then those
     of the other readers, but for cells between blanks or commas, which programs have, too."""
     found: list[tuple[list[Grid], bool]] = []
+    refused: InputError | None = None
     for read, kind in _readers(text, columns):
-        if found and kind == "lines":
+        if (found or refused) and kind == "lines":
             break
         try:
             tables = [_with_names(_first_columns(table)) for grid in read() for table in _headed(grid, columns)]
             found += [(tables, kind == "program")] if tables else []
-        except InputError:
-            if not found:
+        except InputError as error:
+            if not found and "of a loop" not in error.problem:
                 raise
+            refused = refused or error
+    if refused and not found:
+        raise refused
     bare = [] if found else code_grids(text, headed=False)
     orders = [(order, grid) for grid in bare if (order := only_order(grid))]
     if len(orders) == 1:
@@ -490,7 +502,7 @@ class _Table:
         self.from_code = from_code
         self.of_toolbox = from_code and bool(re.search(r"\bSerialLink\(|\bLink\(\[", self.text))
         self.given = self._given(Lists(program(text)) if from_code else None)
-        self._check_headings()
+        self._check_headings(text)
         self.convention = self._stated(program(text) if from_code else None, text, convention)
         # Below its print the Robotics Toolbox writes both, as translations t.
         if re.search(_PLACED if from_code else r"\b(?:base|tool)\W+t\s*=", text):
@@ -519,11 +531,14 @@ class _Table:
         said = _IN_UNIT.search(text) and not re.search(r"100\b|1000\b|(?<!\d)0?\.0+1\b|25\.4|1e-?3", text)
         return [*units - {"m"}] if said and len(units) == 1 and longest > LONGEST_IN_M else []
 
-    def _check_headings(self) -> None:
-        """Refuse two columns of one quantity, and d beside r, of which either can be the link's length."""
-        for k, own in self.headings.items():
+    def _check_headings(self, text: str) -> None:
+        """Refuse two columns of one quantity, but for angles in both units; and d beside r, of which either can be the
+        link's length, where no convention is said: of modified tables it is Khalil's d."""
+        for k, own in [*self.headings.items()]:
             first = self.column.setdefault(own.quantity, k)
-            if k != first:
+            if k != first and own.unit != self.headings[first].unit and self._alike(first, k):
+                self.headings = {place: each for place, each in self.headings.items() if place != k}
+            elif k != first:
                 other = self.header[first]
                 self._refuse(
                     None,
@@ -533,12 +548,28 @@ class _Table:
                 )
         signs = [own.sign if own.sign in ("d", "r") else own.quantity for own in self.headings.values()]
         if [each for each in signs if each in ("alpha", "d", "r")] == ["alpha", "d", "r"] and signs[0] != "theta":
-            self._refuse(
-                None,
-                self.column["a"],
-                "columns d and r: either can be the link's length",
-                "Say which by --column: a for d and d for r (Khalil), or d for d and a for r",
-            )
+            modified, standard = (bool(SIGNS[name].search(text)) for name in ("modified", "standard"))
+            if modified and not standard:
+                a, d = self.column["a"], self.column["d"]
+                self.column |= {"a": d, "d": a}
+                for k, quantity in ((a, "d"), (d, "a")):
+                    self.headings[k] = replace(self.headings[k], quantity=quantity)
+            elif modified == standard:
+                self._refuse(
+                    None,
+                    self.column["a"],
+                    "columns d and r: either can be the link's length",
+                    "Say which by --column: a for d and d for r (Khalil), or d for d and a for r",
+                )
+
+    def _alike(self, *columns: int) -> bool:
+        """Whether two columns hold the same angles, by the units of their headings."""
+        scales = [_SCALES[self.headings[k].unit] if self.headings[k].unit in ("deg", "rad") else 0.0 for k in columns]
+        try:
+            one, other = ([amount_of(cells[k]).number for _, cells in self.rows] for k in columns)
+        except ValueError:
+            return False
+        return all(scales) and all(abs(a * scales[0] - b * scales[1]) < 0.1 for a, b in zip(one, other))
 
     def _stated(self, code: Code | None, text: str, asked: Convention | None) -> Convention | None:
         """The convention that headings, the program, or the text around the table says, a program before words; the
@@ -572,6 +603,8 @@ class _Table:
         self.text = "\n".join(
             [_SEVERAL.sub("", self.text), *(f"{name} = {value}" for each in pairs for name, value in each)]
         )
+        self.text = re.sub(r"(?<![\w.,])(\d+),(\d+)(?=\s*(?:mm|cm|m)\b)", r"\1.\2", self.text)
+        self.text = re.sub(_BOTH, r"\1 = \2, ", self.text)
         given = _GIVEN.findall(self.text)
         given += re.findall(r"[{,]\s*([a-z]\w*\d)\s*:\s*([-\d.]+)()(?=\s*[,}])", self.text)
         given += ((name, TWO_VALUES, "") for name in re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text))
@@ -656,8 +689,8 @@ class _Table:
             given = {
                 name: value
                 for name, value in given.items()
-                if not re.fullmatch(r"(q|θ|th|theta|t)_?\d*", name)
-                or (_JOINT.search(value) and name not in name_of(value))
+                if not re.fullmatch(rf"{_OF_JOINT}_?\d*", name)
+                or (_JOINT.search(value) and name_of(name) not in name_of(value))
             }
         try:
             found = amount_of(text, given)
@@ -757,6 +790,10 @@ class _Table:
         moving = [row for row, kind in enumerate(self.kinds) if kind not in FIXED]
         numbers = [re.search(r"\d+$", self._variable(row)[0]) for row in moving]
         variables = [int(number[0]) if number else None for number in numbers]
+        stems = [self._variable(row)[0].rstrip("0123456789") for row in moving]
+        own = {stem: [number for each, number in zip(stems, variables) if each == stem] for stem in stems}
+        if len(own) > 1 and all(each == [*range(1, len(each) + 1)] for each in own.values()):  # d1, theta1, theta2
+            variables = [None] * len(moving)
         start = 0 if variables[:1] == [0] else 1
         of_rows = all(number in (None, row + start) for row, number in zip(moving, variables))
         for joint, (row, number) in enumerate(zip(moving, variables), start):

@@ -33,7 +33,7 @@ _AS_RECORDS = (
     (r"(?m)^\W*\w+[ \t]+((?:\(\w+[ \t]+[-+\d.]+[ \t]*\)[ \t]*){3,9}).*$", r"{\1}"),  # YARP's (A 0.0) (D 0.0)
     (r"\((\w+)[ \t]+([-+\d.]+)[ \t]*\)", r"\1=\2,"),
     (r"(?m)^([ \t]*\w+)[ \t]*,[ \t]*(\w+)[ \t]*=[ \t]*(\[[^\[\]]*\])[ \t]*,[ \t]*(?=\[)", r"\1 = \3; \2 = "),
-    (r"(?m)^[^=,;(\[{|\n]*:[ \t]*((?:\w+[ \t]*=[ \t]*[^,=(\[{\n]+,[ \t]*){2,8}\w+[ \t]*=[^,=(\[{\n]+)$", r"{\1}"),
+    (r"(?m)^[^=,;(\[{|\n\"]*:[ \t]*((?:\w+[ \t]*=[ \t]*[^,=(\[{\n]+,[ \t]*){2,8}\w+[ \t]*=[^,=(\[{\n]+)$", r"{\1}"),
 )
 """Rows of one line each, as records; and two lists that are named at once."""
 
@@ -58,6 +58,7 @@ class Code:
         for block in BLOCK.finditer(text):
             self.comments |= enumerate(block[0].split("\n"), 1 + text.count("\n", 0, block.start()))
         text = BLOCK.sub(lambda found: "\n" * found[0].count("\n"), re.sub(r"\b(?:self\.|this->)", "", text))
+        text = re.sub(r"(?m)^[ \t]*\[\w+\([^\n]*\)\][ \t]*$|\\(?=[ \t]*$)", "", text)  # C#'s attributes; long lines
         text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
         def kept(found: re.Match[str]) -> str:

@@ -24,7 +24,7 @@ _LATEX = (
     (r"(?<!\\)%.*|&(?=\s*=)|(?m:\\\\[ \t]*$)", ""),  # aligned equations give values
     (r"\\(?:hline|toprule|midrule|bottomrule|hhline\{[^}]*\})|\\(?:cline|cmidrule)(?:\([lr]+\))?\{[^}]*\}", ""),
     (
-        r"\\multirow\s*\{[^}]*\}\s*(?:\[[^\]]*\])?\{[^}]*\}|\\(?:left|right|displaystyle|limits|boldmath|bfseries|bf|rm|it)\b",
+        r"\\multirow\s*\{[^}]*\}\s*(?:\[[^\]]*\])?\{[^}]*\}|\\(?:left|right|displaystyle|limits|boldmath|boldsymbol|bfseries|(?:math)?(?:bf|rm|it))\b",
         "",
     ),
     (r"\\(?:SI|qty)\s*\{([^{}]*)\}\s*\{([^{}]*)\}", r"\1 \2"),

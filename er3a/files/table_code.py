@@ -109,7 +109,9 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
     turning = any(re.match(r"-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for _, cells in rows for cell in cells)
     if len(rows) < 2 or turning or any(re.match(r"[\[{]|\([^()]*,|.*:", cell) for cell in rows[0][1]):
         return []
-    if len(rows) == 4 and re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):  # a pose
+    ends = " ".join(rows[-1][1])
+    units = [sorted(cell.strip("-+.0") for cell in cells) for _, cells in rows]
+    if (len(rows) == 4 and re.fullmatch(r"(0[.0]* ){3}1[.0]*", ends)) or units == [["", "", "1"]] * 3:  # a pose, a turn
         return []
     several = len({line for line, _ in rows}) == len(rows)
     labels = [code.comments.get(line, "") if several else "" for line, _ in rows]

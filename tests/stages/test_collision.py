@@ -327,7 +327,7 @@ def test_open_space_leaves_the_arm_itself(tmp_path):
 
 def test_a_pair_that_is_as_near_in_all_rows_is_named_once_and_hides_no_other(tmp_path):
     """A floor just below the shoulder, around which the upper arm turns."""
-    floor = {"kind": "scene", "title": "Floor", "planes": [{"name": "floor", "normal": [0, 0, 1], "offset_mm": 200}]}
+    floor = {"kind": "scene", "title": "Floor", "planes": [{"name": "floor", "normal": [0, 0, 1], "offset_mm": 266}]}
     (tmp_path / "floor.yaml").write_text(yaml.safe_dump(floor))
     study = study_with(tmp_path / "floor.yaml")
     targets = yaml.safe_load(Path(study.entry(NAME).targets).read_text(encoding="utf-8"))

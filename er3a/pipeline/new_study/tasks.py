@@ -49,7 +49,7 @@ MIN_RADIUS_M = 0.05
 MAX_TARGETS, MIN_TARGETS = 5, 2
 APART = 0.1  # of the reach
 TRIES, CHOICE = 60, 20  # of poses above the ground and of drawn ones each; solved ones to choose from
-LIMIT_MARGIN_RAD = np.radians(8.0)
+LIMIT_MARGIN_RAD, FROM_SCENE = np.radians(8.0), 0.02  # rad, m
 FULL_POSE = 6  # joints that it takes to hold any pose
 FINE_BELOW = 40.0  # deg or mm: joints of a smaller range are written in hundredths
 SINGULAR_MARGIN = 2.0  # times what the study calls near
@@ -176,6 +176,8 @@ class TaskSearch:
         turned = np.linalg.inv(robot.tool) @ along_last_axis(robot)[0].tool
         self.down_deg = (np.round(np.degrees(rpy_of(rot_x(np.pi) @ turned.T))) + 0.0).tolist()
         self.bodies = Bodies(robot, scene)
+        own = [pair for pair, other in zip(self.bodies.pairs, self.bodies.second.tolist()) if other >= 0]
+        self.beside = Bodies(robot, scene, own)
         self.task = planning_of(robot, settings, self.bodies)
         self.margin = settings.assumed_margin_mm / 1000 if arm_shapes(robot).assumed else 0.0
         self.drawn = reach.q[:JUDGED]
@@ -266,7 +268,7 @@ class TaskSearch:
 
     def _fits(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from limits and singular poses, and clear of everything: by the study's margin
-        where shapes are assumed.
+        where shapes are assumed, and of the scene by ``FROM_SCENE``.
 
         Away are 8 deg or a twentieth of a joint's range, and twice what the study calls near a singular pose.
         """
@@ -275,6 +277,7 @@ class TaskSearch:
         room = (np.minimum(q - robot.lower, robot.upper - q) > smallest) | robot.continuous
         fits: Flags = room.all(axis=-1) & (self.task.near.margin(robot, q) > SINGULAR_MARGIN)
         fits[fits] = self.bodies.free(q[fits], self.margin)
+        fits[fits] = self.beside.free(q[fits], FROM_SCENE)
         return fits
 
     def _written(self, q: Reals) -> list[float]:
