@@ -560,6 +560,26 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "arm.alpha(1) = -pi/2;\narm.alpha(2) = 0;\narm.a(1:2) = 0;\narm.a(2) = 270;\narm.d(1) = 290;\narm.d(2) = 0;\n"
         "arm.offset(1) = 0;\narm.offset(2) = -pi/2;",
         "# d, a, alpha\nROWS = [[0.29, 0, -pi/2],\n        [0, 0.27, 0]]\nTHETA_OFFSETS_LEFT = [0, -pi/2]",
+        "a = [0 0.27];\nalpha = [-pi/2 0];\nd = [0.29 0];\nvar = [teta1 teta2-pi/2];\n",
+        "a1 = 0\na2 = 0.27\nd1 = 0.29\nd2 = 0\nalfa1 = -pi/2\nalfa2 = 0\ntheta1 = angulo1\ntheta2 = angulo2 - pi/2\n"
+        "angulo2 = 30\nA1 = row(d1, a1, alfa1, theta1)\nA2 = row(d2, a2, alfa2, theta2)\ndef row(d, a, alfa, theta):",
+        "% DHM\nalpha = [-pi/2 0];\nd = [0 0.27];\nr = [0.29 0];\ntheta = [q(1) q(2)-pi/2];\n",
+        "DH = [-pi/2,0,0.29,0;\n0,0.27,0,-pi/2];\nfor i = 1:1:2\nL(i) = Link([0, DH(i,3), DH(i,2), DH(i,1), 0]);\nend\n"
+        "arm = SerialLink(L);\narm.offset = DH(:,4)';\n",
+        "import DQ\nx_a = [0, 0.27]\nx_alpha = [-pi/2, 0]\nx_d = [0.29, 0]\nx_theta = [0, -pi/2]\n"
+        "DQ_SerialManipulatorDH([x_theta, x_d, x_a, x_alpha])",
+        '[Header("DH (alpha, a, d, theta0)")]\npublic float[] alpha = new float[2]\n{\n -Mathf.PI / 2f,\n 0f\n};\n'
+        "public float[] a = new float[2]\n{\n0f,\n0.27f};\npublic float[] d = new float[2] {0.29f, 0f};\n"
+        "public float[] theta0 = new float[2] {0f, -Mathf.PI / 2f};\n",
+        "// each row = [a, alpha, d, theta]\n// Link 1: [0, -π/2, 0.29, th1]\n// Link 2: [0.27, 0, 0, th2 - π/2]\n"
+        "Matrix T;\n",
+        "| $\\mathbf i$ | $\\mathbf \\alpha$ | $\\mathbf a$ | $\\mathbf d$ | $\\mathbf \\theta$ |\n|--|--|--|--|--|\n"
+        "| 1 | $-\\frac{\\pi}{2}$ | 0 | 0.29 | |\n| 2 | 0 | 0.27 | 0 | $\\theta_2 = \\theta_2 -\\frac{\\pi}{2}$ |\n",
+        "| i | θ | d | a | α (rad) | α (deg) |\n|--|--|--|--|--|--|\n| 1 | q1 | d1 | 0 | -π/2 | -90 |\n"
+        "| 2 | q2-90° | 0 | a2 | 0 | 0 |\n\nd1 = 290,0 mm, a2 = a3 = 270,0 mm\n",
+        '{"links": [{"a": 0, "alpha_deg": -90, "d": 0.29, "offset_deg": 0, "notes": "x: a=0, d=0.29, alpha=90"},\n'
+        '{"a": 0.27, "alpha_deg": 0, "d": 0, "offset_deg": -90, "notes": "x"}]}',
+        "R = [[0,0,1],\n[0,-1,0],\n[1,0,0]]\n# a, alpha, d, theta\nDH = [[0, -pi/2, 0.29, q1], \\\n[0.27, 0, 0, q2-pi/2]]\n",
     ],
 )
 def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
