@@ -579,7 +579,8 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "| 2 | q2-90° | 0 | a2 | 0 | 0 |\n\nd1 = 290,0 mm, a2 = a3 = 270,0 mm\n",
         '{"links": [{"a": 0, "alpha_deg": -90, "d": 0.29, "offset_deg": 0, "notes": "x: a=0, d=0.29, alpha=90"},\n'
         '{"a": 0.27, "alpha_deg": 0, "d": 0, "offset_deg": -90, "notes": "x"}]}',
-        "R = [[0,0,1],\n[0,-1,0],\n[1,0,0]]\n# a, alpha, d, theta\nDH = [[0, -pi/2, 0.29, q1], \\\n[0.27, 0, 0, q2-pi/2]]\n",
+        "R = [[0,0,1],\n[0,-1,0],\n[1,0,0]]\n"
+        "# a, alpha, d, theta\nDH = [[0, -pi/2, 0.29, q1], \\\n[0.27, 0, 0, q2-pi/2]]\n",
     ],
 )
 def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
