@@ -8,6 +8,7 @@ from typing import Any
 from er3a.by_value import frozen
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.dynamics import payload_key
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import ProgramsResults
@@ -31,7 +32,8 @@ class Tile:
     """An answer, which leads to its page, and its picture.
 
     ``asked``: what it answers, by ``answer``, in the colour of ``mark``. ``entries``, the first ``rows`` of ``all``
-    below a ``heading``, ``drawing`` with ``keys``: what is shown, one of them.
+    below a ``heading`` with ``sound``, names that are none of them, ``drawing`` with ``keys``: what is shown, one of
+    them.
     """
 
     asked: str
@@ -42,6 +44,7 @@ class Tile:
     rows: Sequence[ListRow] = ()
     all: int = 0
     heading: str = ""
+    sound: str = ""
     drawing: str = ""
     keys: Sequence[tuple[str, str]] = ()
 
@@ -87,9 +90,10 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
     others = [row for row in rows if row.mark != "pass"] or rows
+    passing = "" if others is rows else joined([row.name for row in rows if row.mark == "pass"], ", ")
     page = f"{name}/{found.stage}.html"
     asked = tr("Which {what} pass?", what=what)
-    return Tile(asked, said.headline, sound, page, rows=others[:FEW], all=len(others), heading=said.rest)
+    return Tile(asked, said.headline, sound, page, rows=others[:FEW], all=len(others), heading=said.rest, sound=passing)
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:

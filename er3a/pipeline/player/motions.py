@@ -38,13 +38,14 @@ class PlayedEvent:
 
 @frozen
 class Mark:
-    """A line between two points (m), a dot where they are one, with a word, shown from ``t0`` to ``t1`` (s)."""
+    """A line or an arrow between two points (m), a dot where they are one, with a word, from ``t0`` to ``t1`` (s)."""
 
     t0: float
     t1: float
     start: tuple[float, float, float]
     end: tuple[float, float, float]
     text: str
+    arrow: bool = False
 
 
 @frozen

@@ -43,6 +43,15 @@ const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
 const ranges = [...part("joints").querySelectorAll("summary i")];
 const stretches = [...document.querySelectorAll("[data-from]")];
 
+/** An arrow with a flat head, seen from the eye. */
+function drawArrow(from, to, css) {
+  const [size, back] = [0.03 * data.size, subtract(from, to)];
+  const shaft = scaled(back, size / Math.hypot(...back));
+  const barbs = [-0.4, 0.4].map((side) => add(to, add(shaft, scaled(space.eye.right, side * size))));
+  space.line([from, to], css, 4);
+  space.line([barbs[0], to, barbs[1]], css, 4);
+}
+
 function prepared(motion) {
   const count = motion.times.length;
   const loads = motion.loads && decodeValues(motion.loads, count);
@@ -150,8 +159,9 @@ function draw() {
   for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
   space.keepClear([...axes.flatMap(([a, b]) => [b, scaled(add(a, b), 0.5)]), motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   const css = touching.size || wrong ? page.touching : page.ink;
-  for (const { from, to, text } of marks) {
-    if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
+  for (const { from, to, text, arrow } of marks) {
+    if (arrow) drawArrow(from, to, css);
+    else if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
     else space.line([from, to], text ? css : page.ink, text ? 4 : 3), text && [from, to].forEach((end) => space.dot(end, css, 4));
     space.keepClear(Array.from({ length: 17 }, (_, k) => add(scaled(from, 1 - k / 16), scaled(to, k / 16))), 0);
   }

@@ -308,7 +308,7 @@ def _motion(motion: PlayedMotion, most: int) -> dict[str, Any]:
         "loads": None if motion.loads is None else _packed(motion.loads[rows]),
         "events": [asdict(event) for event in sorted(motion.events, key=lambda event: event.t)],
         "marks": [
-            {"from": mark.start, "to": mark.end, "text": mark.text, "t0": mark.t0, "t1": mark.t1}
+            {"from": mark.start, "to": mark.end, "text": mark.text, "t0": mark.t0, "t1": mark.t1, "arrow": mark.arrow}
             for mark in motion.marks
         ],
     }

@@ -20,7 +20,7 @@ from er3a.robots.robot import Robot
 
 MM = 1000.0
 LEVEL = 0.01  # sine of an axis' slope, up to which it counts as level
-DROP_M, HEAD_M = 0.2, 0.03  # length of an arrow drawn for a weight, and of its head
+DROP_M = 0.2  # length of an arrow drawn for a weight
 ABOVE_M = 0.14  # of the arm: there its level distance has room
 FELT = 0.01  # of the greatest peak: what is less is no event
 
@@ -100,15 +100,13 @@ def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> lis
     top = np.add(at, [0, 0, ABOVE_M])
     far, heavy = with_unit(fixed(MM * float(np.linalg.norm(lever)), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
     tip = centre - [0, 0, DROP_M]
-    aside = HEAD_M * lever / np.linalg.norm(lever)
-    head = [Mark(0.0, 1.0, tuple(tip), tuple(tip + way - [0, 0, -HEAD_M]), "") for way in (aside, -aside)]
     sides = [Mark(0.0, 1.0, tuple(at), tuple(top), ""), Mark(0.0, 1.0, tuple(centre), tuple(top + lever), "")]
     level = Mark(0.0, 1.0, tuple(top), tuple(top + lever), far)
     own = []
     for mass, way in zip(kg, off):
         start, down = at + way, [0, 0, DROP_M * mass / kg.sum()]
-        own.append(Mark(0.0, 1.0, tuple(start), tuple(start - down), with_unit(number(mass, 3), "kg")))
-    return [level, Mark(0.0, 1.0, tuple(centre), tuple(tip), heavy), *sides, *head, *own]
+        own.append(Mark(0.0, 1.0, tuple(start), tuple(start - down), with_unit(number(mass, 3), "kg"), arrow=True))
+    return [level, Mark(0.0, 1.0, tuple(centre), tuple(tip), heavy, arrow=True), *sides, *own]
 
 
 def within(value: float, tolerance: float, decimals: int = 2) -> str:
