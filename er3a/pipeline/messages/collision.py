@@ -7,7 +7,7 @@ from typing import Any
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import BASE, TRIED, bodies_of
 from er3a.finding import Finding
-from er3a.pipeline.language import own_title, tr, words
+from er3a.pipeline.language import own_title, tr, with_unit, words
 from er3a.pipeline.messages import expectations, scope  # noqa: F401
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import FORMATS, WORDS, same_text, say, say_as, says, sentence, texts, word
@@ -79,7 +79,7 @@ TEXTS = texts(
             "space is collision-free. Of {places} cells {clear} are reached without collision.[ From home: "
             "{joined}.]"
         ),
-        "nearest_target": "[over {near:g} mm{far:?}][{clearance_mm:.1f} mm ({name}, {pair}){far:!}]",
+        "nearest_target": "{clearance_mm:.1f} mm ({name}[, {pair}{near:?}])",
         "colliding": "{name} ({pair}[; as expected{expected:?}])",
     }
 )
@@ -108,13 +108,13 @@ same_text("colliding", "colliding_path", "colliding_target")
 
 @says("nearest_target")
 def _(found: Finding) -> str:
-    return say_as(found, near=NEAR_MM, far=found.clearance_mm > NEAR_MM)
+    return say_as(found, near=found.clearance_mm <= NEAR_MM)
 
 
 def clearance_text(clearance_mm: float, pair: Finding) -> str:
     """How near what comes; what is farther than ``NEAR_MM`` decides nothing, so it is not named."""
     if clearance_mm > NEAR_MM:
-        return tr("over {far:g} mm", far=NEAR_MM)
+        return with_unit(fixed(clearance_mm, 0), "mm")
     return tr("{far} mm: {pair}", far=fixed(clearance_mm, 1), pair=say(pair))
 
 

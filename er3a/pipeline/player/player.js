@@ -45,7 +45,7 @@ const stretches = [...document.querySelectorAll("[data-from]")];
 
 /** An arrow with a flat head, seen from the eye. */
 function drawArrow(from, to, css) {
-  const [size, back] = [0.03 * data.size, subtract(from, to)];
+  const [size, back] = [0.02 * data.size, subtract(from, to)];
   const shaft = scaled(back, size / Math.hypot(...back));
   const barbs = [-0.4, 0.4].map((side) => add(to, add(shaft, scaled(space.eye.right, side * size))));
   space.line([from, to], css, 4);

@@ -11,7 +11,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, clearance_text, state_word, why
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import say, word
+from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import Fault, PlayedEvent, at_rest, fix_of
 from er3a.pipeline.player.player import drawing_head, player
@@ -88,15 +88,15 @@ def _answer(
     ticks = [(float(np.interp(line, span, [0.0, 1.0])), fixed(line, 0)) for line in lines]
     near = shapes.near if shapes else ()
     rows = [_row(each, unreached, near, known.get(each.name), span, lines) for each in closest]
-    hit, clear, elsewhere, partly = (
+    hit, clear, partly = (
         [row for row in rows if row.mark in marks]
-        for marks in (("fail",), ("pass", "caution"), ("no_reference",), ("none",))
+        for marks in (("fail",), ("pass", "caution", "no_reference"), ("none",))
     )
     blocked = len(params.get("blocked", ()))
     in_vain = tr("{count} targets collide in every solution.", count=blocked) if blocked else ""
     caught = len(params.get("demonstrations", ()))
     due = len(rows) + blocked - caught - len(partly)
-    headline = tr("{count} of {due} poses and paths clear.", count=len(clear + elsewhere), due=due)
+    headline = tr("{count} of {due} poses and paths clear.", count=len(clear), due=due)
     keys = [
         (with_unit(fixed(each.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=each.name))
         for each in closest
@@ -105,7 +105,6 @@ def _answer(
     titled = (
         (tr("Collide"), hit),
         (tr("Clear, nearest first"), clear),
-        (tr("Clear, but fail at Paths"), elsewhere),
         (tr("Clear as far as reached"), partly),
         (tr("Always as near, left out above"), steady),
     )
@@ -137,7 +136,7 @@ def _row(
         mark = "none"
     fault = fault if of_path else None
     if fault and mark == "pass":
-        mark = "no_reference"
+        mark, note = "no_reference", joined([note, tr("fails at Paths")], ", ")
     fix = fix_of([fault]) if fault and fault.instead and mark == "fail" else None
     zero, end = np.interp([0.0, found.clearance_mm], span_mm, [0.0, 1.0])
     own: PartMark = "fail" if mark == "fail" else "none" if mark == "none" else "pass"

@@ -193,7 +193,7 @@ def _answer(robot: Robot, results: model.DynamicsResults, file: str) -> Answer:
         [
             Group(title, rows, counted=False)
             for title, rows in (
-                (tr("Worst pose; bars to {most}", most=ends[0]), still),
+                (tr("Held still, worst pose; bars to {most}", most=ends[0]), still),
                 (tr("Greatest torque on the paths"), moving),
             )
         ],

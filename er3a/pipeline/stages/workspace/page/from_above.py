@@ -9,8 +9,6 @@ from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined
-from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import outlines
@@ -47,10 +45,9 @@ def from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, tra
     (left, below), (right, above) = (1000 * corner[:2] for corner in tray.corners)
     corners = np.array([[left, below], [right, below], [right, above], [left, above]])
     parts.append(Markup('<polygon class="tray" points="{}"/>').format(_line(corners)))
-    said = joined([tr("tray"), with_unit(f"({millimetres(tray.place.centre_m)})", "mm")], " ")
     x, y = 1000 * np.array(tray.place.centre_m[:2])
     beyond = above + height / 3 if y > 0 else below - height  # away from the way that leads there
-    words.append(_word(np.array([(left + right) / 2, beyond]), height, said, "tray", size))
+    words.append(_word(np.array([(left + right) / 2, beyond]), height, tr("tray"), "tray", size))
     parts.append(Markup('<path class="way" d="M0,0H{:.0f}V{:.0f}"/>').format(x, -y))
     far = reach * _way(3 * np.pi / 4 if y <= 0 else -3 * np.pi / 4)  # where the tray is not
     parts.append(Markup('<path class="scale" d="M0,0L{:.0f},{:.0f}"/>').format(far[0], -far[1]))
