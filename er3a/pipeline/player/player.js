@@ -173,7 +173,7 @@ function draw() {
   space.keepClear(motion.trails[0], 0);
   const pixels = ([x, y], [u, v]) => Math.hypot(u - x, v - y);
   const gap = marks.find(({ from, to, text }) => text && String(from) !== String(to) && pixels(space.seen(from), space.seen(to)) < SHORT);
-  if (gap && !touching.size && !motion.loads) space.closer(scaled(add(gap.from, gap.to), 0.5));
+  if (gap && !touching.size && !motion.loads) space.closer(scaled(add(gap.from, gap.to), 0.5), gap.text);
   for (const { from, to, text } of marks) if (text) space.word(text, scaled(add(from, to), 0.5), css);
   data.signs.forEach(({ text, at }, k) => space.word(text, wrong ? column(poses[k][3], 3) : at, k === 0 && wrong ? page.touching : page.ink));
   space.names(surroundings, touching);

@@ -138,7 +138,7 @@ WORDS: dict[str, Any] = {
         "elbow": N_("from straight or folded"),
         "shoulder": N_("wrist centre from the plane of axes 1 and 2"),
     },
-    "clear": N_("Clear: no contact, limit or singularity."),
+    "clear": N_("Clear. Inside all limits, not singular."),
     "touch": {"near": N_("Near contact."), "at": N_("Collision.")},
     "near": {
         "wrist": N_("Near the wrist singularity: axes 4 and 6 are {distance} from parallel."),

@@ -157,14 +157,14 @@ export class Space extends Orbit {
   }
 
   /** Shows what is about a point again in a corner, `CLOSER` times as large. */
-  closer(point) {
+  closer(point, text) {
     const [x, y, depth] = this.seen(point);
     const side = INSET * Math.min(this.width, this.height);
     const [left, top] = [this.width, this.height].map((end) => end - side - this.letters);
     this.inset = { left, side, depth: depth / CLOSER, position: add(point, scaled(this.eye.back, depth / CLOSER)) };
     this.#svg("path", { d: `M${x},${y}L${left},${top}h${side}v${side}h${-side}v${-side}`, fill: "none", stroke: this.page.muted });
     this.taken.push([left + side / 2, top + side / 2, side, side]);
-    this.#svg("text", { x: left + 2 * this.letters, y: top + this.letters, fill: this.page.ink, stroke: this.page.halo, "font-size": WORD * this.letters }, `× ${CLOSER}`);
+    this.#svg("text", { x: left + 2 * this.letters, y: top + this.letters, fill: this.page.ink, stroke: this.page.halo, "font-size": WORD * this.letters }, `${text} × ${CLOSER}`);
   }
 
   /** Shows the picture. */

@@ -24,6 +24,7 @@ from er3a.pipeline.messages.trajectory import (
     strategy_text,
     strategy_word,
 )
+from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.player.motions import Fault, PlayedMotion, opened, row_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
@@ -40,7 +41,6 @@ from er3a.pipeline.stages.trajectory.page.played import (
     worst_first,
 )
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
-from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
 from er3a.pipeline.stages.workspace.page.tray import found_by
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, judged, may_run
@@ -226,7 +226,7 @@ def both_arms(
     study: Study, stored: Stored[Any], played: Sequence[PlayedMotion]
 ) -> tuple[Answer, dict[str, Any]] | None:
     """An arm whose table evidence contradicts over that of the table to use instead, at the same joint values, each
-    motion where their tools are farthest from each other; a list of how far that is, and which entries are wrong. None
+    motion where their tools are farthest from each other; a list of how far that is, and where their flanges are. None
     for other arms."""
     instead, found = alternative_table(study, stored.robot, stored.folder), found_by(stored, "validation")
     arms = [study.robot(name) for name in (stored.robot, instead) if name]
@@ -239,10 +239,11 @@ def both_arms(
         k = np.argmax(off)
         far = with_unit(fixed(1000 * off[k], 0), "mm")
         seen.append(replace(motion, beside=(motion.q,)))
-        rows.append((off[k], far, (motion.name, motion.t[k])))
+        places = tuple(millimetres(end[k, :3, 3].tolist()) for end in ends[::-1])
+        rows.append((off[k], far, (motion.name, motion.t[k]), places))
     rows.sort(reverse=True)
-    whole, most, opened = rows[0]
-    listed = [ListRow("fail", at[0], far, "", at, off / whole) for off, far, at in rows]
+    whole, most, opened, _ = rows[0]
+    listed = [ListRow("fail", at[0], far, "", at, off / whole) for off, far, at, _ in rows]
     answer = Answer(
         "",
         tr("The tool lands up to {far} off.", far=most),
@@ -251,4 +252,4 @@ def both_arms(
     )
     signs = [own_title(arm.title) for arm in arms]
     drawn = player(arms[0], seen, beside=arms[1:], signs=signs, opened=opened)
-    return answer, {"player": drawn, "wrong_table": evidence_section(found.results.summary.evidence)}
+    return answer, {"player": drawn, "flanges": [[at[0], *places] for _, _, at, places in rows]}

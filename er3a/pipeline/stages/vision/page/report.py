@@ -135,7 +135,8 @@ def _errors(each: model.ObjectResult | None, task: VisionFile) -> list[Group]:
         parts = [Part(0.0, off / scale, mark), Part(limit / scale, 1.0, "rest")]
         rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
     turn = min(task.gripper.tolerance_deg)
-    title = tr("{name}: 95 % error; line {limit:g} mm/{turn:g}°", name=each.name, limit=limit, turn=turn)
+    allowed = tr("allowed: {limit:g} mm, {turn:g}°", limit=limit, turn=turn)
+    title = tr("{name}: error of 95 % of grasps; {allowed}", name=each.name, allowed=allowed)
     return [Group(title, rows, counted=False)]
 
 
