@@ -164,7 +164,7 @@ export class Space extends Orbit {
     this.inset = { left, side, depth: depth / CLOSER, position: add(point, scaled(this.eye.back, depth / CLOSER)) };
     this.#svg("path", { d: `M${x},${y}L${left},${top}h${side}v${side}h${-side}v${-side}`, fill: "none", stroke: this.page.muted });
     this.taken.push([left + side / 2, top + side / 2, side, side]);
-    this.#svg("text", { x: left + 2 * this.letters, y: top + this.letters, fill: this.page.ink, stroke: this.page.halo, "font-size": WORD * this.letters }, `${text} × ${CLOSER}`);
+    this.#svg("text", { x: left + side / 2, y: top + this.letters, fill: this.page.ink, stroke: this.page.halo, "font-size": WORD * this.letters }, `${text} × ${CLOSER}`);
   }
 
   /** Shows the picture. */
