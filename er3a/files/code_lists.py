@@ -88,7 +88,8 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
             quantity = "theta" if len(others) == len(cells) else quantity
         if quantity not in _OF_VECTORS or not cells or of_others:
             continue
-        as_printed = "r" if name == "r" and quantity == "a" else quantity
+        kept = (name, quantity) == ("r", "a") or (quantity == "offset" and name[-1] == "0")
+        as_printed = name if kept else quantity
         title = f"{quantity}(i-1)" if heading and heading.before else as_printed
         _, first, place, other = columns.setdefault(quantity, (title, cells, line, name))
         if first != cells and quantity not in ("theta", "pose"):

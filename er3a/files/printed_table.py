@@ -638,6 +638,8 @@ class _Table:
                 self._theta(k)
             elif quantity not in ("", "joint", "type"):
                 self._constants(k, quantity)
+                if quantity == "offset" and name.endswith("0"):
+                    self.notes.append(f"'{name}' was read as offsets: theta = q + {name}")
             elif not quantity and stem in OWN:
                 self.columns[name] = [cells[k] for _, cells in self.rows]
             elif not quantity and name not in ("", "-"):

@@ -177,7 +177,7 @@ class TaskSearch:
         self.down_deg = (np.round(np.degrees(rpy_of(rot_x(np.pi) @ turned.T))) + 0.0).tolist()
         self.bodies = Bodies(robot, scene)
         own = [pair for pair, other in zip(self.bodies.pairs, self.bodies.second.tolist()) if other >= 0]
-        self.beside = Bodies(robot, scene, own)
+        self.around = Bodies(robot, scene, own)
         self.task = planning_of(robot, settings, self.bodies)
         self.margin = settings.assumed_margin_mm / 1000 if arm_shapes(robot).assumed else 0.0
         self.drawn = reach.q[:JUDGED]
@@ -277,7 +277,7 @@ class TaskSearch:
         room = (np.minimum(q - robot.lower, robot.upper - q) > smallest) | robot.continuous
         fits: Flags = room.all(axis=-1) & (self.task.near.margin(robot, q) > SINGULAR_MARGIN)
         fits[fits] = self.bodies.free(q[fits], self.margin)
-        fits[fits] = self.beside.free(q[fits], FROM_SCENE)
+        fits[fits] = self.around.free(q[fits], FROM_SCENE)
         return fits
 
     def _written(self, q: Reals) -> list[float]:
