@@ -81,7 +81,7 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("no_correction_fits", "contradiction", "advice.no_part"),
     *("read_limit", "time_joint"),
     *("held_back_contradict", "held_back_elsewhere", "held_back_fitted"),
-    *("payload", "why.coarse", "shapes_assumed"),
+    *("why.coarse", "shapes_assumed"),
     *("validation.off", "validation.no_reference", "validation.defined_otherwise", "far_from_table"),
 }
 NO_ADVICE = {"below_limit", "trajectory.paths"}

@@ -638,8 +638,6 @@ class _Table:
                 self._theta(k)
             elif quantity not in ("", "joint", "type"):
                 self._constants(k, quantity)
-                if quantity == "offset" and name.endswith("0"):
-                    self.notes.append(f"'{name}' was read as offsets: theta = q + {name}")
             elif not quantity and stem in OWN:
                 self.columns[name] = [cells[k] for _, cells in self.rows]
             elif not quantity and name not in ("", "-"):
@@ -826,6 +824,8 @@ class _Table:
                     f"'{min(found.variables)}' has no value",
                     f"Write {min(found.variables)} = ... below the table",
                 )
+        if quantity == "offset" and self.header[k].endswith("0"):
+            self.notes.append(f"'{self.header[k]}' was read as offsets: theta = q + {self.header[k]}")
         self._add(k, quantity, self.amounts[quantity])
 
     def _theta(self, k: int) -> None:
