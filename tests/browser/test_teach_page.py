@@ -353,8 +353,8 @@ def test_way_points_become_a_path_file_and_a_program_that_er3a_reads(panel, tmp_
         ((10, 20, 30, 40, 3, 0), "near", "Near the wrist singularity: axes 4 and 6 are 3.0° from parallel."),
         ((10, 20, 30, 40, 0, 0), "at", "At the wrist singularity"),
         ((0, 0, 76.824, 0, 50, 0), "near", "Near the elbow singularity"),
-        ((0, 0, 0, 0, 50, 0), "clear", "Clear: no contact, limit or singularity."),
-        ((0, 60.5, -30, 0, 50, 0), "clear", "Clear: no contact, limit or singularity."),
+        ((0, 0, 0, 0, 50, 0), "clear", "Clear. Inside all limits, not singular."),
+        ((0, 60.5, -30, 0, 50, 0), "clear", "Clear. Inside all limits, not singular."),
     ],
 )
 def test_the_warning_names_what_is_near(used, degrees, state, told):
@@ -416,7 +416,7 @@ def test_the_chinese_panel_warns_in_chinese_alone(browser, folder, chinese):
     for degrees, told in (
         ((0, 0, 0, 0, 0, 0), "处于腕部奇异：轴 4 与轴 6 平行"),
         ((10, 20, 30, 40, 3, 0), "接近腕部奇异：轴 4 与轴 6 距平行还差 3.0°。"),
-        ((30, -20, 15, 40, 60, 10), "此位形无碰触、无超限、无奇异。"),
+        ((30, -20, 15, 40, 60, 10), "无碰触。各关节在限位内，非奇异。"),
     ):
         panel.move(*degrees)
         panel.until(lambda told=told: panel.text("#warning").startswith(told))

@@ -23,7 +23,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import ListRow, Mark
 
 Results = Mapping[str, Stored[Any]]
-FEW = 10  # rows of a tile: so many are seen whole on the first screen
+FEW, ROOMY = 10, 8  # rows of a tile that are seen whole on the first screen, and with room for the rest
 LETTERS = 0.14  # of the reach, in the small view from above
 
 
@@ -90,7 +90,7 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
     others = [row for row in rows if row.mark != "pass"] or rows
-    passing = "" if others is rows else joined([row.name for row in rows if row.mark == "pass"], ", ")
+    passing = "" if others is rows or len(others) > ROOMY else joined([row.name for row in rows if row.mark == "pass"], ", ")
     page = f"{name}/{found.stage}.html"
     asked = tr("Which {what} pass?", what=what)
     return Tile(asked, said.headline, sound, page, rows=others[:FEW], all=len(others), heading=said.rest, sound=passing)

@@ -136,7 +136,7 @@ def _errors(each: model.ObjectResult | None, task: VisionFile) -> list[Group]:
         rows.append(ListRow(mark, tr(cause), text, length=1.0, parts=parts))
     turn = min(task.gripper.tolerance_deg)
     allowed = tr("allowed: {limit:g} mm, {turn:g}°", limit=limit, turn=turn)
-    title = tr("{name}: error of 95 % of grasps; {allowed}", name=each.name, allowed=allowed)
+    title = tr("{name}: 95 % error; {allowed}", name=each.name, allowed=allowed)
     return [Group(title, rows, counted=False)]
 
 
