@@ -90,7 +90,8 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     sound: Mark = "pass" if results.summary.verdict.status == "pass" else "caution"
     rows = sorted((row for group in said.groups for row in group.rows), key=lambda row: row.mark != "fail")
     others = [row for row in rows if row.mark != "pass"] or rows
-    passing = "" if others is rows or len(others) > ROOMY else joined([row.name for row in rows if row.mark == "pass"], ", ")
+    has_room = others is not rows and len(others) <= ROOMY
+    passing = joined([row.name for row in rows if row.mark == "pass"], ", ") if has_room else ""
     page = f"{name}/{found.stage}.html"
     asked = tr("Which {what} pass?", what=what)
     return Tile(asked, said.headline, sound, page, rows=others[:FEW], all=len(others), heading=said.rest, sound=passing)
