@@ -17,7 +17,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from er3a.by_value import frozen
 from er3a.errors import InputError, given_bytes
@@ -222,10 +222,26 @@ def printed_table(
     if not tables:
         return None
     tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]
+    tables = next(([one] for one in tables if len(tables) == 2 and _moved_on(one, *tables)), tables)
     if len(tables) > 1:
         problem = f"{len(tables)} D-H tables, at lines {' and '.join(str(t[0][0] or t[1][0]) for t in tables[:2])}"
         raise InputError(path, None, problem, "Give a file with one of them")
     return _Table(path, text, tables[0], from_code, convention).converted()
+
+
+def _moved_on(one: Grid, *both: Grid) -> bool:
+    """Whether of two tables the other is the same arm's modified one: its a and alpha stand a row later."""
+    found = list[dict[str, list[Any]]]()
+    for (_, header), *rows in (one, *(table for table in both if table is not one)):
+        columns = {name: [row[k] for _, row in rows] for k, each in enumerate(header) for name in quantities_of([each])}
+        try:
+            numbers = {name: [amount_of(cell).number for cell in columns[name]] for name in sorted(NEEDED)}
+        except (KeyError, ValueError):
+            return False
+        found.append(numbers | {"theta": [re.sub(r"\W", "", cell) for cell in columns.get("theta", [])]})
+    same = (found[0][name][:-1] == found[-1][name][1:] for name in ("a", "alpha"))
+    alike = all(found[0][name][:-1] == found[-1][name][:-1] for name in ("d", "theta"))
+    return len(found) == 2 and all(same) and alike and found[0]["a"] != found[1]["a"]
 
 
 def _differ(one: Grid, other: Grid) -> bool:

@@ -1302,3 +1302,19 @@ def test_base_and_tool_below_a_printed_table_are_named(tmp_path):
 def test_a_list_of_turns_about_y_is_no_list_to_leave_out(tmp_path):
     lists = "a = [0, 270]\nalpha = [-90, 0]\nd = [290, 0]\nbeta = [0, 0.5]\n"
     assert [row.beta_deg for row in read(tmp_path, lists)[0].dh.rows] == [0, 0.5]
+
+
+@pytest.mark.parametrize("changed", ["", "0.02 | q2", "0 | q2+90"])
+def test_an_arm_in_both_conventions_is_one(tmp_path, changed):
+    own = "| 1 | q1 | 0.3 | 0 | -π/2 |\n| 2 | q2 | 0 | 0.27 | 0 |\n| 3 | q3 | 0.1 | 0 | 0 |\n"
+    standard = f"| i | θ | d | a | α |\n|-|-|-|-|-|\n{own}"
+    rows = "| 1 | 0 | 0 | 0.3 | q1 |\n| 2 | -π/2 | 0 | 0 | q2 |\n| 3 | 0 | 0.27 | 0 | q3 |\n"
+    modified = f"| i | α(i-1) | a(i-1) | d | θ |\n|-|-|-|-|-|\n{rows}"
+    if changed:
+        modified = modified.replace("0 | q2", changed)
+    for text in (f"Standard\n\n{standard}\n\nModified\n\n{modified}", f"{modified}\n\nand\n\n{standard}"):
+        if changed:
+            with pytest.raises(InputError, match="2 D-H tables"):
+                read(tmp_path, text)
+        else:
+            assert [row.a_mm for row in read(tmp_path, text)[0].dh.rows] == pytest.approx([0, 270, 0])
