@@ -222,11 +222,18 @@ def printed_table(
     if not tables:
         return None
     tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]
-    tables = next(([one] for one in tables if len(tables) == 2 and _moved_on(one, *tables)), tables)
+    twice = [one for one in tables if len(tables) == 2 and _moved_on(one, *tables)]
+    if twice:
+        convention = convention or "standard"
+        tables = [one for one in tables if (one is twice[0]) == (convention == "standard")]
     if len(tables) > 1:
         problem = f"{len(tables)} D-H tables, at lines {' and '.join(str(t[0][0] or t[1][0]) for t in tables[:2])}"
         raise InputError(path, None, problem, "Give a file with one of them")
-    return _Table(path, text, tables[0], from_code, convention).converted()
+    made = _Table(path, text, tables[0], from_code, convention)
+    if twice:
+        made.convention = convention
+        made.notes[:] = [f"of two tables, one arm's in both conventions, the {convention} one was read"]
+    return made.converted()
 
 
 def _moved_on(one: Grid, *both: Grid) -> bool:

@@ -1317,4 +1317,6 @@ def test_an_arm_in_both_conventions_is_one(tmp_path, changed):
             with pytest.raises(InputError, match="2 D-H tables"):
                 read(tmp_path, text)
         else:
-            assert [row.a_mm for row in read(tmp_path, text)[0].dh.rows] == pytest.approx([0, 270, 0])
+            table = read(tmp_path, text)[0].dh
+            assert [row.a_mm for row in table.rows] == pytest.approx([0, 270, 0])
+            assert table.convention == "standard"
