@@ -222,7 +222,8 @@ def printed_table(
     if not tables:
         return None
     tables += [grid for grids, _ in others for grid in grids if _differ(tables[0], grid)]
-    twice = [one for one in tables if len(tables) == 2 and _moved_on(one, *tables)]
+    pair = len(tables) == 2 and not from_code
+    twice = [one for one in tables if pair and _moved_on(one, *tables)]
     if twice:
         convention = convention or "standard"
         tables = [one for one in tables if (one is twice[0]) == (convention == "standard")]
