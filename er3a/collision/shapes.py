@@ -48,6 +48,7 @@ VISIBLE = 0.02  # m, by which a link's visible mesh may protrude: covers and cab
 COVERED, GAP = 0.75, 0.04  # of a link's lengths in the table its shapes have to reach along so much, or all but GAP, m
 ASSUMED_GRADES: tuple[Grade, ...] = ("inferred", "claim")
 PARALLEL = 1e-6  # cosine short of 1
+PAST = 0.01  # m, beyond a flange: bosses and bolts stand out less
 UNSHAPED = 0.02  # m, of the way from the flange to a tool's point: adapters are thin, and tools reach a little less far
 
 
@@ -223,16 +224,20 @@ def outward(robot: Robot) -> tuple[float, float]:
     Returns
     -------
     sense : 1 along the axis, or -1; 0 where the flange is on no side of that joint, and no file gives a shape there
-    beyond : m, from the flange to the end of the last link's shape that way; below 0 where it ends before
+    beyond : m, from the flange to the end of the last link's shape that way; 0 where that ends before, or stands beside
+        the flange, as a camera does, and not around it
     """
-    at = float(constant_links(robot.replace(tool=np.eye(4)))[-1][2, 3])
-    parts = [np.array([each.start, each.end])[:, 2] for each in robot.envelopes if each.link == robot.rows]
-    parts += [np.array(each.points)[:, 2] for each in robot.hulls if each.link == robot.rows]
-    parts += [each.points[:, 2] for each in robot.meshes if each.link == robot.rows]
-    along = np.concatenate(parts or [np.array([at])]) - at
-    ends = np.array([along.min(), along.max()])
-    sense = float(np.sign(at if abs(at) > SHORTEST else ends.sum()))
-    return sense, float((sense * ends).max())
+    at = constant_links(robot.replace(tool=np.eye(4)))[-1][:3, 3]
+    parts = [np.array([each.start, each.end]) for each in robot.envelopes if each.link == robot.rows]
+    parts += [np.array(each.points) for each in robot.hulls if each.link == robot.rows]
+    parts += [each.points for each in robot.meshes if each.link == robot.rows]
+    points = np.concatenate(parts or [at[None]]) - at
+    along = points[:, 2]
+    sense = float(np.sign(at[2] if abs(at[2]) > SHORTEST else along.min() + along.max()))
+    past = points[sense * along > PAST]
+    turns = np.sort(np.arctan2(past[:, 1], past[:, 0]))
+    around = len(past) > 0 and np.diff(turns, append=turns[0] + 2 * np.pi).max() < np.pi
+    return sense, float((sense * past[:, 2]).max()) if around else 0.0
 
 
 def _length_without(bodies: Sequence[Body], start: Reals, end: Reals) -> float:

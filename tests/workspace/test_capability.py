@@ -137,7 +137,7 @@ def test_a_tool_points_along_the_last_axis_whatever_the_flanges_axes_are_called(
 @pytest.mark.parametrize(("ends", "name"), [((0.02, 0.07), "z"), ((-0.07, -0.02), "−z")])
 def test_of_a_flange_at_the_wrist_the_last_links_shape_says_where_out_is(ends, name):
     robot = load_robot("irb120")
-    piece = ConvexPiece(6, tuple((x, y, z) for x in (0.0, 0.02) for y in (0.0, 0.02) for z in ends), 0.0)
+    piece = ConvexPiece(6, tuple((x, y, z) for x in (-0.02, 0.02) for y in (-0.02, 0.02) for z in ends), 0.0)
     robot = robot.replace(d=np.array([*robot.d[:5], 0.0]), flange=np.eye(4), envelopes=(), meshes=(), hulls=(piece,))
     assert along_last_axis(robot)[1] == name
     assert [(each.reason, each.amount) for each in assumed_tool(robot)] == [

@@ -168,9 +168,6 @@ def gaps_in_solids(scene: Scene | None, places: Iterable[tuple[str, Reals, float
     return (Open("inside_solid", tuple(found)),) if found else ()
 
 
-BEYOND_M = 0.01  # of a last link's shape, beyond which the flange is not its end: bosses and bolts stand out less
-
-
 def assumed_tool(robot: Robot) -> tuple[Open, ...]:
     """That the flange's centre was taken for a tool's tip, and where it is not the end of the last link.
 
@@ -185,7 +182,7 @@ def assumed_tool(robot: Robot) -> tuple[Open, ...]:
     if "tool" in robot.sources or not np.array_equal(robot.tool, np.eye(4)):
         return ()
     beyond = outward(robot)[1]
-    return (Open("tool"), *([Open("beyond_flange", (), 1000 * beyond)] if beyond > BEYOND_M else []))
+    return (Open("tool"), *([Open("beyond_flange", (), 1000 * beyond)] if beyond else []))
 
 
 ORIENTATION_OFF_DEG = 0.1  # of what an arm of few joints can't set; poses with two decimals of deg are off by less

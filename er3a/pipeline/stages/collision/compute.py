@@ -145,8 +145,8 @@ def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int)
 STAGE_NAME = "collision"
 CHECKS = 1  # points of a path checked between its samples to begin with; clearance adds what it needs
 SAMPLES_STREAM, PLACES_STREAM = 0, 1
-FEWEST_ROWS, STEADY_MM, STEADY, STEADY_JOINTS = 3, 3.0, 0.15, 3
-"""Poses; a steady pair's change of clearance, mm, or as a share of it; joints between the pair."""
+FEWEST_ROWS, STEADY_MM, STEADY_JOINTS = 3, 5.0, 3
+"""Poses; a steady pair's change of clearance, which is no more than the clearance; joints between the pair."""
 HOMES = 64  # free joint vectors among which a home is chosen
 
 
@@ -241,7 +241,7 @@ def _steady(bodies: Bodies, closest: Sequence[model.Closest]) -> tuple[model.Ste
     far, pairs = far[:, met], pairs[met]
     low, spread = far.min(axis=0), np.ptp(far, axis=0)
     joints = np.abs(links[bodies.layout.first] - links[bodies.layout.second])[met]
-    steady = (low > 0) & (spread <= np.maximum(STEADY_MM, STEADY * low)) & (joints <= STEADY_JOINTS)
+    steady = (low > 0) & (spread <= np.minimum(STEADY_MM, low)) & (joints <= STEADY_JOINTS)
     if steady.all():
         return ()
     nearer = np.flatnonzero(steady & (low < min(model.NEAR_MM, far[:, ~steady].min(axis=1).max())))
