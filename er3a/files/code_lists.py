@@ -153,7 +153,7 @@ _OF_VECTORS = words_of("a alpha beta d theta offset type direction pose")
 _NUMBERED = re.compile(
     r"""
     (?<![\w."'])(?P<quote>["'])?(?:DH_)?
-    (?P<name>al(?:p|ph|f)a?|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)
+    (?P<name>al(?:p|ph|f)a?|tw|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)
     (?P<bracket>[_({\[]*)(?P<number>\d{1,2})(?:,1)?[)}\]]*(?(quote)(?P=quote))   # a1, "a1", a_{1}, a(1)
     \s*(?P<mark>[:=])(?!=)\s*
     (?!(?:\w+\.)?symbols?\()                                             # a symbol of SymPy is no value

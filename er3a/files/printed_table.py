@@ -874,6 +874,12 @@ class _Table:
                 f"{offsets[0]}, and there are offsets too",
                 "Add it to the offset, or leave it out",
             )
+        for row, (slides, each) in enumerate(zip(sliding, found)):
+            if slides and each.variables:
+                name = min(each.variables)
+                self._refuse(
+                    row, k, f"'{name}' of a joint that slides has no value", f"Write {name} = ... below the table"
+                )
         if any(sliding):
             self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])
 
@@ -916,6 +922,10 @@ class _Table:
     def _has_radians(self) -> bool:
         """Whether other columns are in radians, whose small angles are radians then."""
         in_pi = (re.search("(?i)π|pi", cell) for _, cells in self.rows for cell in cells)
+        if self.from_code and re.search(
+            r"\b(?:SerialLink|DHRobot)\(", self.text
+        ):  # of toolboxes that take nothing else
+            return True
         return any(own.unit == "rad" for own in self.headings.values()) or any(in_pi)
 
 

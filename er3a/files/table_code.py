@@ -144,6 +144,9 @@ def _listed(code: Code) -> Grid:
 
 def _titled(code: Code, rows: Grid, labels: Words, before: str = "") -> Grid:
     """A matrix below the names of its columns, [] if it has none; with the labels of its rows, if each has one."""
+    if {*quantities_of(labels)} >= {"a", "alpha", "d"}:  # a row for each quantity
+        names = ["theta" if quantities_of([each]) == ["joint"] else each for each in labels]
+        return [(0, names), *((rows[0][0], [*cells]) for cells in zip(*(cells for _, cells in rows)))]
     header = order_of(code, rows, before) or _symbols(rows)
     labelled = all(re.search(r"[^\W\d_]|^\d+$", each) for each in labels) and not all(map(heading_of, labels))
     if header and "joint" not in header and labelled:

@@ -16,8 +16,8 @@ _JOINT = words_of(
 )
 _NAMES = words_of(
     "a=a r=a l=a d=d q=theta v=theta phi=theta φ=theta th=theta teta=theta tetha=theta thetha=theta "
-    "alf=alpha alfa=alpha alp=alpha alph=alpha al=alpha offset=offset offsets=offset relativeoffset=offset "
-    "theta0=offset θ0=offset th0=offset "
+    "tehta=theta tw=alpha alf=alpha alfa=alpha alp=alpha alph=alpha al=alpha offset=offset "
+    "offsets=offset relativeoffset=offset theta0=offset θ0=offset th0=offset "
     "θoff=offset thoff=offset thetaoff=offset type=type jointtype=type sigma=type σ=type 类型=type"
 )
 _WORDS = words_of(

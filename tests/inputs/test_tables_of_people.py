@@ -579,6 +579,10 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "| 2 | q2-90° | 0 | a2 | 0 | 0 |\n\nd1 = 290,0 mm, a2 = a3 = 270,0 mm\n",
         '{"links": [{"a": 0, "alpha_deg": -90, "d": 0.29, "offset_deg": 0, "notes": "x: a=0, d=0.29, alpha=90"},\n'
         '{"a": 0.27, "alpha_deg": 0, "d": 0, "offset_deg": -90, "notes": "x"}]}',
+        "a1=0; d1=0.29; tw1=-pi/2; th1=q1;\na2=L2; d2=0; tw2=0; th2=q2-pi/2;\nL2=0.27;\n",
+        'P = {\n"alpha": {\n"value": [-np.pi / 2, 0.0],\n"free": [True, True],\n},\n'
+        '"a": {\n"value": [0.0, 0.27],\n"free": [True, True]},\n"d": {"value": [0.29, 0.0],\n"free": [True, True]},\n'
+        '"theta_offset": {"value": [0.0, -np.pi / 2],\n"free": [True, True]}}\n',
         "R = [[0,0,1],\n[0,-1,0],\n[1,0,0]]\n"
         "# a, alpha, d, theta\nDH = [[0, -pi/2, 0.29, q1], \\\n[0.27, 0, 0, q2-pi/2]]\n",
     ],
@@ -1320,3 +1324,15 @@ def test_an_arm_in_both_conventions_is_one(tmp_path, changed):
             table = read(tmp_path, text)[0].dh
             assert [row.a_mm for row in table.rows] == pytest.approx([0, 270, 0])
             assert table.convention == "standard"
+
+
+def test_a_matrix_may_have_a_row_for_each_quantity(tmp_path):
+    text = "DH << 0.29, 0, 0.1, // d\n -M_PI_2, 0, 0, // alpha\n 0, 0.27, 0, // a\n q1, q2 - M_PI_2, q3; // joints\n"
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content)[:2], IRB120[:2], atol=1e-6)
+
+
+def test_theta_of_a_slide_that_a_pose_may_hold_is_asked_back(tmp_path):
+    links = "L = [RevoluteDH(d=0.3, alpha=pi/2), PrismaticDH(theta=theta[1], a=0.1, alpha=0)]"
+    with pytest.raises(InputError, match="slides has no value"):
+        read(tmp_path, f"theta = [0, pi/2]\n{links}\n")
