@@ -224,8 +224,8 @@ def outward(robot: Robot) -> tuple[float, float]:
     Returns
     -------
     sense : 1 along the axis, or -1; 0 where the flange is on no side of that joint, and no file gives a shape there
-    beyond : m, from the flange to the end of the last link's shape that way; 0 where that ends before, or stands next to
-        the flange, as a camera does, and not around it
+    beyond : m, from the flange to the end of the last link's shape that way; 0 where that ends before, or is not around
+        the flange, as a camera at its side
     """
     at = constant_links(robot.replace(tool=np.eye(4)))[-1][:3, 3]
     parts = [np.array([each.start, each.end]) for each in robot.envelopes if each.link == robot.rows]
