@@ -26,7 +26,7 @@ from er3a.workspace.directions import Roll, cone_directions, roll_of, tool_rotat
 AskedKind = Literal["directions", "tilts", "turns", "points"]
 _PARALLEL = 1e-9  # sine: rounding of tables that are exact
 _MIN_PLANAR = 3  # joints that place the tool in a plane and tilt it there
-_ALONG = 1 - 1e-6  # cosine: axes of files that round pi/2 to three decimals
+ALONG = 1 - 1e-6  # cosine: axes of files that round pi/2 to three decimals
 _TASK_TURNS = 36  # about a SCARA's axes, one for each 10 deg
 
 
@@ -228,7 +228,7 @@ def along_last_axis(robot: Robot) -> tuple[Robot, str]:
     axis = constant_links(robot)[-1][2, :3]
     k = int(np.abs(axis).argmax())
     z = axis * (outward(robot)[0] or np.sign(axis[k]))
-    if robot.slides[-1] or z[2] > _ALONG or abs(axis[k]) < _ALONG or not np.array_equal(robot.tool, np.eye(4)):
+    if robot.slides[-1] or z[2] > ALONG or abs(axis[k]) < ALONG or not np.array_equal(robot.tool, np.eye(4)):
         return robot, "z"
     x = np.cross(np.eye(3)[(k + 1) % 3], z)
     x /= np.linalg.norm(x)

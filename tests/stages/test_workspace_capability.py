@@ -16,9 +16,11 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.yaml_file import load
 from er3a.finding import is_one
-from er3a.geometry.transforms import transform
+from er3a.geometry.transforms import transform, translation
 from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.chain import constant_links
 from er3a.kinematics.solutions import branch_labels
+from er3a.pipeline.messages.workspace import reached_text
 from er3a.pipeline.stages.workspace.compute import _assumed
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.stages.workspace.model import CellLookup
@@ -27,7 +29,7 @@ from er3a.pipeline.stages.workspace.page.tray import placing, trays
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
-from er3a.robots.robot import Robot
+from er3a.robots.robot import ConvexPiece, Robot
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
 from er3a.workspace.placement import narrowed
 from er3a.workspace.proven import prove_robot
@@ -166,6 +168,19 @@ def test_no_place_is_no_error():
     context = context_of(load_robot("er3_600"), done)
     assert context["tray_rows"] == []
     assert not list(_assumed(done))
+
+
+def test_of_a_flange_within_its_link_the_tray_is_asked_at_the_links_end():
+    robot = load_robot("er3_600")
+    beyond = constant_links(robot)[-1][2, 3] + 0.05
+    corners = tuple((x, y, z) for x in (-0.02, 0.02) for y in (-0.02, 0.02) for z in (beyond - 0.06, beyond))
+    robot = robot.replace(envelopes=(), meshes=(), hulls=(ConvexPiece(6, corners, 0.0),))
+    asked = settings(placement={"box_mm": [100.0, 100.0, 20.0], "cone_deg": 5}, directions=40)
+    found = tool_capability(robot, asked, 0.1).placement
+    held = tool_capability(robot.replace(tool=translation(0, 0, 0.05)), asked, 0.1).placement
+    assert found.beyond_m == pytest.approx(0.05)
+    assert found.places == held.places != ()
+    assert "50 mm beyond" in reached_text(found)
 
 
 def test_a_box_lower_than_the_layers_of_places_stands_whole_or_is_told_why_not():

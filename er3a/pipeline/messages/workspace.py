@@ -58,8 +58,9 @@ TEXTS = texts(
             "and run again.[ No tool is given: repeat it with your tool's length.{bare:?}]"
         ),
         "box.sampled": (
-            "the tool[ along the flange's {own}], up to {cone:g}° from {axis}, reaches all points sampled above the "
-            "tray's lowest {served_from} mm; clearance was sampled, without tray and stand"
+            "the tool[ along the flange's {own}][ from the last link's end, {beyond} mm beyond it], up to "
+            "{cone:g}° from {axis}, reaches all points sampled above the tray's lowest {served_from} mm; clearance was "
+            "sampled, without tray and stand"
         ),
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool out of ({direction:.2f, }) into the cone."
@@ -95,7 +96,10 @@ def reached_text(placement: model.PlacementSummary, served_from_m: float = 0.0) 
     down = tuple(round(each, 6) for each in axis) == (0, 0, -1)
     along = tr("straight down") if down else f"({', '.join(f'{x:g}' for x in axis)})"
     own = None if placement.tool_axis == "z" else placement.tool_axis
-    return sentence("box.sampled", axis=along, cone=cone, served_from=millimetres([served_from_m]), own=own)
+    beyond = millimetres([placement.beyond_m]) if placement.beyond_m else None
+    return sentence(
+        "box.sampled", axis=along, cone=cone, served_from=millimetres([served_from_m]), own=own, beyond=beyond
+    )
 
 
 def run_again_text(summary: Summary) -> str:

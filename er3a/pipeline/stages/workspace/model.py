@@ -300,7 +300,8 @@ class PlacementSummary:
 
     ``scene`` is the title of what the arm may not touch there; None in open space. Nor may it touch itself.
     ``margin_mm`` is what it keeps from both. ``stands`` are the level surfaces of the scene, the highest first.
-    ``tool_axis`` is the flange's axis that the tool points along.
+    ``tool_axis`` is the flange's axis that the tool points along, from ``beyond_m`` beyond the flange, where the last
+    link's shape ends.
     """
 
     scene: str | None
@@ -313,6 +314,7 @@ class PlacementSummary:
     places: tuple[PlaceSummary, ...]
     stands: tuple[StandSummary, ...] = ()
     tool_axis: str = "z"
+    beyond_m: float = 0.0
 
     @property
     def named_places(self) -> list[tuple[str, PlaceSummary]]:

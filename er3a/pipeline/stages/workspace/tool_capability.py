@@ -17,7 +17,10 @@ import numpy as np
 from er3a.by_value import by_identity
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
+from er3a.collision.shapes import outward
 from er3a.finding import Finding, fact
+from er3a.geometry.transforms import translation
+from er3a.kinematics.chain import constant_links
 from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
@@ -27,7 +30,7 @@ from er3a.robots.robot import Robot
 from er3a.workspace.capability import map_capability, overall, rings
 from er3a.workspace.cell_frame import cell_frame, is_quick
 from er3a.workspace.directions import RING, cone_directions
-from er3a.workspace.orientations import AskedOrientations, along_last_axis, asked_of
+from er3a.workspace.orientations import ALONG, AskedOrientations, along_last_axis, asked_of
 from er3a.workspace.placement import (
     MIXED,
     NO,
@@ -176,7 +179,11 @@ def tool_capability(
     margin : m, that the arm keeps from the scene and from itself where it serves the box
     proven : what is known of the reach; cells that are proven empty need not be asked
     """
+    sense, beyond = outward(robot) if np.array_equal(robot.tool, np.eye(4)) else (0.0, 0.0)
     robot, tool_axis = along_last_axis(robot)
+    beyond *= constant_links(robot)[-1][2, 2] * sense > ALONG
+    if beyond:  # nothing can be held within the last link
+        robot, proven = robot.replace(tool=robot.tool @ translation(0, 0, beyond)), None
     asked, lacks = asked_of(robot, settings.rolls), lacking_for_maps(robot)
     if lacks or asked is None:
         missing = (
@@ -204,7 +211,7 @@ def tool_capability(
     )
     placement, places = _placed(robot, settings, task, plan, scene=scene, margin=margin)
     if isinstance(placement, model.PlacementSummary):
-        placement = replace(placement, tool_axis=tool_axis)
+        placement = replace(placement, tool_axis=tool_axis, beyond_m=beyond)
     return ToolCapability(summary, placement, model.capability(middles, found, frame.bar > 0), places)
 
 
