@@ -88,7 +88,7 @@ def columns_of(lists: Iterable[NamedList], program: str) -> list[Grid]:
             quantity = "theta" if len(others) == len(cells) else quantity
         if quantity not in _OF_VECTORS or not cells or of_others:
             continue
-        kept = (name, quantity) == ("r", "a") or (quantity == "offset" and name[-1] == "0")
+        kept = (name, quantity) == ("r", "a") or (quantities_of([name]) == [quantity] == ["offset"] and name[-1] == "0")
         as_printed = name if kept else quantity
         title = f"{quantity}(i-1)" if heading and heading.before else as_printed
         _, first, place, other = columns.setdefault(quantity, (title, cells, line, name))

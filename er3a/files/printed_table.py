@@ -922,9 +922,8 @@ class _Table:
     def _has_radians(self) -> bool:
         """Whether other columns are in radians, whose small angles are radians then."""
         in_pi = (re.search("(?i)π|pi", cell) for _, cells in self.rows for cell in cells)
-        if self.from_code and re.search(
-            r"\b(?:SerialLink|DHRobot)\(", self.text
-        ):  # of toolboxes that take nothing else
+        of_toolbox = self.from_code and re.search(r"\b(?:SerialLink|DHRobot)\(", self.text)  # which takes nothing else
+        if of_toolbox:
             return True
         return any(own.unit == "rad" for own in self.headings.values()) or any(in_pi)
 

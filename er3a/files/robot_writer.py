@@ -14,6 +14,7 @@ import yaml
 from er3a.errors import InputWarning
 from er3a.files.kept_files import write_atomically, write_text
 from er3a.files.robot_file import (
+    MAX_NOTES,
     MIN_LONGEST_MM,
     RESIDUE_MM,
     SHORTEST_PLAIN_LENGTH_MM,
@@ -114,7 +115,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         "title": robot.title,
         "zero_pose": robot.zero_pose or "not stated",
         "references": list(robot.references),
-        "notes": list(robot.notes),
+        "notes": list(robot.notes[:MAX_NOTES]),
         "visuals": _surfaces(robot.visuals),
         "home_deg": None if robot.home is None else list(map(_tidy, shown(robot, robot.home))),
     }
