@@ -294,7 +294,7 @@ def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):
         "dynamics.marginal",
         ("friction",),
     )
-    assert "loads, ratings or paths are left out" in say(verdict)
+    assert "but joints have no friction" in say(verdict)
     assert Open("friction", ("J4",)) in found.results.summary.assumed
 
 

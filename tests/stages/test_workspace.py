@@ -74,7 +74,7 @@ def test_a_void_has_the_same_bounds_wherever_it_is_and_a_contradicted_table_has_
     for status in ("caution", "fail"):
         report(study, replace(stored, table=status), tmp_path / "page.html")
         page = (tmp_path / "page.html").read_text(encoding="utf-8")
-        assert (f"An enclosed void of at least {low:.2f} L" in page) == (status == "caution")
+        assert (f"It is {low:.2f} L at least" in page) == (status == "caution")
         assert f">{low:.2f} to {-high:.2f}</td>" in page  # the same bounds, outwards, wherever they stand
         assert ("<dt>Payload there</dt>" in page, 'id="placement"' in page) == (status != "fail",) * 2
         assert "dynamics.html#payload" not in page  # it lies not beside these results

@@ -181,9 +181,8 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     closest = nearest = (*at_targets, *on_paths)
     if steady := _steady(bodies, closest):
         targets, paths, nearest = _but_steady(bodies, steady, study.entry(name).targets, motions, tolerance)
-    in_view = [each for each in nearest if each.kind == "target"]
     assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
-    free = _free_space(space, places_found, in_view, blocked, _colliding(motions, on_paths, first_touch)).but(
+    free = _free_space(space, places_found, nearest, blocked, _colliding(motions, on_paths, first_touch)).but(
         shapes_assumed=assumed is not None
     )
     covered = covered_collisions(robot, bodies, scene)
@@ -262,11 +261,12 @@ def _but_steady(
 def _free_space(
     space: free_space.JointSpace,
     places: model.PlacesSummary,
-    at_targets: list[model.Closest],
+    nearest: Sequence[model.Closest],
     blocked: tuple[Finding, ...],
     colliding: tuple[Finding, ...],
 ) -> Finding:
     """How much of joint space and of the reached places is free, and what targets and paths come to."""
+    at_targets = [each for each in nearest if each.kind == "target"]
     return fact(
         "collision.free_space",
         free_ratio=space.whole.value,
